@@ -1,0 +1,1 @@
+"""What: the asset graph, one file an area."""

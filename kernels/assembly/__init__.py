@@ -1,0 +1,1 @@
+"""From choreography to poses, and how good they are."""

@@ -1,0 +1,1 @@
+"""Which pose may follow which, and the best way through."""

@@ -1,0 +1,1 @@
+"""Kernels on a device, each the twin of a NumPy reference."""

@@ -1,0 +1,367 @@
+"""Rotations as unit quaternions, batched over leading axes.
+
+Conventions
+-----------
+Quaternions are ``wxyz``, right-handed, and act on column vectors: ``apply(mul(a, b), v) = apply(a, apply(b, v))``.
+Angles are radians. All functions take any leading axes ``(..., 4)`` and compute in float64.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Float = NDArray[np.float64]
+
+IDENTITY: Float = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def normalize(q: ArrayLike) -> Float:
+    """Scale to unit length.
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, not zero
+
+    Returns
+    -------
+    (..., 4) float64
+
+    Raises
+    ------
+    ValueError
+        If a quaternion is zero or not finite.
+    """
+    q = np.asarray(q, np.float64)
+    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    if not (np.isfinite(length).all() and (length > 0).all()):
+        raise ValueError("q: want finite quaternions of non-zero length, got a zero or a NaN; check the rotations read")
+    return q / length
+
+
+def mul(a: ArrayLike, b: ArrayLike) -> Float:
+    """Compose: first ``b``, then ``a``.
+
+    Parameters
+    ----------
+    a, b : (..., 4) float, wxyz, broadcast together
+
+    Returns
+    -------
+    (..., 4) float64
+    """
+    aw, ax, ay, az = np.moveaxis(np.asarray(a, np.float64), -1, 0)
+    bw, bx, by, bz = np.moveaxis(np.asarray(b, np.float64), -1, 0)
+    return np.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def inv(q: ArrayLike) -> Float:
+    """Invert unit quaternions.
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, unit
+
+    Returns
+    -------
+    (..., 4) float64
+    """
+    return np.asarray(q, np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def apply(q: ArrayLike, v: ArrayLike) -> Float:
+    """Rotate vectors.
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, unit
+    v : (..., 3) float, broadcast with ``q``
+
+    Returns
+    -------
+    (..., 3) float64
+    """
+    q = np.asarray(q, np.float64)
+    v = np.asarray(v, np.float64)
+    w, u = q[..., :1], q[..., 1:]
+    t = 2.0 * np.cross(u, v)
+    return v + w * t + np.cross(u, t)
+
+
+def from_axis_angle(axis: ArrayLike, angle_rad: ArrayLike) -> Float:
+    """Turn by an angle about a unit axis.
+
+    Parameters
+    ----------
+    axis : (..., 3) float, unit
+    angle_rad : (...) float, radians
+
+    Returns
+    -------
+    (..., 4) float64, wxyz
+    """
+    half = np.asarray(angle_rad, np.float64)[..., None] / 2.0
+    xyz = np.sin(half) * np.asarray(axis, np.float64)
+    return np.concatenate([np.broadcast_to(np.cos(half), (*xyz.shape[:-1], 1)), xyz], axis=-1)
+
+
+def from_euler(angle_rad: ArrayLike, order: str) -> Float:
+    """Compose intrinsic rotations about the axes of ``order``, first letter outermost.
+
+    ``from_euler([a, b, c], "zyx")`` is ``Rz(a) Ry(b) Rx(c)``: the way BVH channels are read from left to right.
+
+    Parameters
+    ----------
+    angle_rad : (..., n) float, radians, n = len(order)
+    order : letters of "xyz", any length >= 0, any repetition
+
+    Returns
+    -------
+    (..., 4) float64, wxyz
+        The identity when ``order`` is empty.
+
+    Raises
+    ------
+    ValueError
+        If the last axis does not fit ``order`` or a letter is not x, y or z.
+    """
+    angle = np.asarray(angle_rad, np.float64)
+    if angle.shape[-1] != len(order) or set(order) - set("xyz"):
+        raise ValueError(f"order: want {angle.shape[-1]} letters of xyz, got {order!r}")
+    q = np.broadcast_to(IDENTITY, (*angle.shape[:-1], 4))
+    for i, letter in enumerate(order):
+        q = mul(q, from_axis_angle(np.eye(3)["xyz".index(letter)], angle[..., i]))
+    return q
+
+
+def to_matrix(q: ArrayLike) -> Float:
+    """Write as rotation matrices for column vectors.
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, unit
+
+    Returns
+    -------
+    (..., 3, 3) float64
+    """
+    q = np.asarray(q, np.float64)
+    return np.stack([apply(q, axis) for axis in np.eye(3)], axis=-1)
+
+
+def from_matrix(m: ArrayLike) -> Float:
+    """Read rotation matrices for column vectors (Shepperd's method: the largest component divides).
+
+    Parameters
+    ----------
+    m : (..., 3, 3) float, orthonormal, determinant 1
+
+    Returns
+    -------
+    (..., 4) float64, wxyz, unit, w >= 0
+    """
+    m = np.asarray(m, np.float64)
+    m00, m11, m22 = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    a, b, c = m[..., 2, 1], m[..., 0, 2], m[..., 1, 0]
+    d, e, f = m[..., 1, 2], m[..., 2, 0], m[..., 0, 1]
+    candidates = np.stack(
+        [
+            np.stack([1 + m00 + m11 + m22, a - d, b - e, c - f], -1),
+            np.stack([a - d, 1 + m00 - m11 - m22, c + f, b + e], -1),
+            np.stack([b - e, c + f, 1 - m00 + m11 - m22, a + d], -1),
+            np.stack([c - f, b + e, a + d, 1 - m00 - m11 + m22], -1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(np.stack([m00 + m11 + m22, m00, m11, m22], -1), axis=-1)
+    q = normalize(np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :])
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def log(q: ArrayLike) -> Float:
+    """Rotation vectors: axis times angle, angle in [0, pi].
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, unit
+
+    Returns
+    -------
+    (..., 3) float64, radians
+    """
+    q = np.asarray(q, np.float64)
+    q = np.where(q[..., :1] < 0, -q, q)
+    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, q[..., :1])
+    scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)
+    return scale * q[..., 1:]
+
+
+def exp(rotation_vector: ArrayLike) -> Float:
+    """Invert :func:`log`.
+
+    Parameters
+    ----------
+    rotation_vector : (..., 3) float, radians
+
+    Returns
+    -------
+    (..., 4) float64, wxyz, unit
+    """
+    v = np.asarray(rotation_vector, np.float64)
+    angle = np.linalg.norm(v, axis=-1, keepdims=True)
+    scale = np.where(angle > 1e-12, np.sin(angle / 2) / np.maximum(angle, 1e-12), 0.5)
+    return np.concatenate([np.cos(angle / 2), scale * v], axis=-1)
+
+
+def angle_between(a: ArrayLike, b: ArrayLike) -> Float:
+    """Angle of the rotation from ``a`` to ``b``.
+
+    Parameters
+    ----------
+    a, b : (..., 4) float, wxyz, unit
+
+    Returns
+    -------
+    (...) float64, radians, 0 to pi
+    """
+    return np.asarray(np.linalg.norm(log(mul(inv(a), b)), axis=-1), np.float64)
+
+
+def slerp(a: ArrayLike, b: ArrayLike, weight: ArrayLike) -> Float:
+    """Walk the shorter great arc from ``a`` to ``b``.
+
+    Parameters
+    ----------
+    a, b : (..., 4) float, wxyz, unit
+    weight : (...) float, 0 gives ``a``, 1 gives ``b``
+
+    Returns
+    -------
+    (..., 4) float64, wxyz, unit
+    """
+    a = np.asarray(a, np.float64)
+    weight = np.asarray(weight, np.float64)[..., None]
+    return mul(a, exp(weight * log(mul(inv(a), b))))
+
+
+def between(u: ArrayLike, v: ArrayLike) -> Float:
+    """Shortest rotation that takes direction ``u`` to direction ``v``.
+
+    Opposite directions turn by pi about an axis chosen by rule: the one perpendicular to ``u`` that lies closest to
+    the x axis, or to the z axis when ``u`` is along x.
+
+    Parameters
+    ----------
+    u, v : (..., 3) float, not zero, any length
+
+    Returns
+    -------
+    (..., 4) float64, wxyz, unit
+
+    Raises
+    ------
+    ValueError
+        If a vector is zero or not finite.
+    """
+    u = np.asarray(u, np.float64)
+    v = np.asarray(v, np.float64)
+    u, v = np.broadcast_arrays(u, v)
+    length = np.linalg.norm(u, axis=-1, keepdims=True), np.linalg.norm(v, axis=-1, keepdims=True)
+    if not all(np.isfinite(n).all() and (n > 0).all() for n in length):
+        raise ValueError("u, v: want finite directions of non-zero length, got a zero or a NaN")
+    u, v = u / length[0], v / length[1]
+    w = 1.0 + np.sum(u * v, axis=-1, keepdims=True)
+    opposite = w < 1e-9
+    side = np.where(np.abs(u[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    perpendicular = side - u * np.sum(u * side, axis=-1, keepdims=True)
+    q = np.concatenate([np.where(opposite, 0.0, w), np.where(opposite, perpendicular, np.cross(u, v))], axis=-1)
+    return normalize(q)
+
+
+def twist(q: ArrayLike, axis: ArrayLike) -> Float:
+    """Part of a rotation about an axis, from the decomposition ``q = swing * twist``.
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, unit
+    axis : (..., 3) float, unit
+
+    Returns
+    -------
+    (..., 4) float64, wxyz, unit
+        The identity where ``q`` turns the axis by exactly pi: the twist is undefined there.
+    """
+    q = np.asarray(q, np.float64)
+    axis = np.asarray(axis, np.float64)
+    along = np.sum(q[..., 1:] * axis, axis=-1, keepdims=True)
+    t = np.concatenate([q[..., :1], along * axis], axis=-1)
+    length = np.linalg.norm(t, axis=-1, keepdims=True)
+    return np.where(length > 1e-9, t / np.maximum(length, 1e-9), IDENTITY)
+
+
+def continuous(q: ArrayLike) -> Float:
+    """Choose signs along the first axis so that each quaternion lies in the hemisphere of the one before.
+
+    Parameters
+    ----------
+    q : (F, ..., 4) float, wxyz, unit
+
+    Returns
+    -------
+    (F, ..., 4) float64
+        First frame with w >= 0. Empty in, empty out.
+    """
+    q = np.asarray(q, np.float64)
+    if len(q) == 0:
+        return q.copy()
+    flip = np.concatenate(
+        [np.where(q[:1, ..., 0] < 0, -1.0, 1.0), np.where(np.sum(q[1:] * q[:-1], axis=-1) < 0, -1.0, 1.0)]
+    )
+    return q * np.cumprod(flip, axis=0)[..., None]
+
+
+def heading_rad(q: ArrayLike) -> Float:
+    """Direction a body faces about the vertical: 0 along +Z, pi/2 along +X.
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, unit
+        World rotation of the hips; a body at rest faces +Z with Y up.
+
+    Returns
+    -------
+    (...) float64, radians, -pi to pi
+
+    Notes
+    -----
+    The forward axis is used where it is not near the vertical. Bent over or lying, where forward points up or down,
+    the side axis (left is +X) decides instead, so that the heading does not flip.
+    """
+    forward = apply(q, np.array([0.0, 0.0, 1.0]))
+    left = apply(q, np.array([1.0, 0.0, 0.0]))
+    by_forward = np.arctan2(forward[..., 0], forward[..., 2])
+    by_left = np.arctan2(-left[..., 2], left[..., 0])
+    return np.where(np.hypot(forward[..., 0], forward[..., 2]) >= 0.5, by_forward, by_left)
+
+
+def from_heading(angle_rad: ArrayLike) -> Float:
+    """Turn about the vertical: the inverse of :func:`heading_rad` for an upright body.
+
+    Parameters
+    ----------
+    angle_rad : (...) float, radians
+
+    Returns
+    -------
+    (..., 4) float64, wxyz
+    """
+    return from_axis_angle(np.array([0.0, 1.0, 0.0]), angle_rad)

@@ -1,0 +1,1 @@
+"""Poses of one skeleton, and of another."""

@@ -1,0 +1,1 @@
+"""When and where: what Dagster loads, and the command."""

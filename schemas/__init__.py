@@ -1,0 +1,1 @@
+"""Shape: tables and files, and nothing else."""

@@ -1,0 +1,38 @@
+"""Columns used by more than one table, and the makers of columns."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from schemas.table import Column
+
+VECTOR = pa.list_(pa.float32(), 3)
+QUATERNION = pa.list_(pa.float32(), 4)
+VECTORS = pa.list_(VECTOR)
+QUATERNIONS = pa.list_(QUATERNION)
+
+CLIP_ID = Column("clip_id", pa.string(), "Clip: its session and its take, joined by '-'.")
+SESSION = Column("session", pa.string(), "Capture session: one folder of clips, or a part of a large one.")
+SONG_ID = Column("song_id", pa.string(), "Song: from its file's name.")
+METHOD = Column("method_name", pa.string(), "Method that chose the choreography.")
+
+PATH = Column("path", pa.string(), "Source file, relative to the studio.")
+SOURCE_SHA256 = Column("source_sha256", pa.string(), "Hash of the source file's bytes, hexadecimal.")
+STATE = Column("state", pa.string(), "Whether the source was read or refused.", values=("read", "refused"))
+REASON = Column("reason", pa.string(), "Why it was refused, one sentence; null when it was read.", is_optional=True)
+DURATION_S = Column("duration_s", pa.float64(), "Length; 0 when refused.")
+
+FRAME_INDEX = Column("frame_index", pa.int32(), "Frame of its clip or dance, from 0.")
+TIME_S = Column("time_s", pa.float64(), "Time from the clip's first frame or the song's first decoded sample.")
+ROOT_XYZ_M = Column("root_xyz_m", VECTOR, "World position of the root joint.")
+ROTATION_WXYZ = Column(
+    "rotation_wxyz", QUATERNIONS, "Rotation of each joint local to its parent; the root's in the world."
+)
+POSITION_XYZ_M = Column("position_xyz_m", VECTORS, "World position of each joint.")
+
+BEAT_INDEX = Column("beat_index", pa.int32(), "Beat of its clip or song, from 0.")
+CONFIDENCE_RATIO = Column("confidence", pa.float32(), "How sure the detector is, 0 to 1.")
+
+WARP_RATIO = Column(
+    "warp_ratio", pa.float32(), "Song time over clip time; above 1 the clip plays slower than recorded."
+)

@@ -1,0 +1,41 @@
+"""Tables of the motion graph."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from schemas import fields as f
+from schemas.table import Column, Table
+
+NODE_INDEX = Column("node_index", pa.int32(), "Node of the motion graph, from 0, sorted by clip and time.")
+
+MOTION_GRAPH_NODE = Table(
+    name="motion_graph_node",
+    version=1,
+    meaning="One beat of one clip as a node of the motion graph.",
+    key=("node_index",),
+    columns=(
+        NODE_INDEX,
+        f.CLIP_ID,
+        f.BEAT_INDEX,
+        f.TIME_S,
+        Column("next_node_index", pa.int32(), "The clip's next beat; -1 at its last."),
+        Column("label", pa.string(), "Label of the clip."),
+        Column("is_kept", pa.bool_(), "False where pruning found that a dance could not go on from here."),
+    ),
+)
+
+MOTION_GRAPH_EDGE = Table(
+    name="motion_graph_edge",
+    version=1,
+    meaning="One transition: the dance may jump from a beat of one clip (`clip_id`) to a beat of another.",
+    key=("source_node_index", "target_node_index"),
+    columns=(
+        Column("source_node_index", pa.int32(), "Node before the seam."),
+        Column("target_node_index", pa.int32(), "Node after the seam."),
+        f.CLIP_ID,
+        Column("target_clip_id", pa.string(), "Clip after the seam."),
+        Column("distance_score", pa.float32(), "Pose distance d(i,j); lower is closer."),
+        Column("edge_cost", pa.float32(), "d(i,j) / (d(i) + d(j)): equation 20 of JP5778523B2."),
+    ),
+)

@@ -1,0 +1,93 @@
+"""Tables of clips: the files, their skeletons and poses, their beats."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from schemas import fields as f
+from schemas.table import Column, Table
+
+CLIP = Table(
+    name="clip",
+    version=1,
+    meaning="One file of motion under clips/.",
+    key=("clip_id", "path"),
+    columns=(
+        f.CLIP_ID,
+        f.SESSION,
+        f.PATH,
+        f.SOURCE_SHA256,
+        Column("frame_rate_hz", pa.float64(), "Frames a second, cleaned of rounding; 0 when refused."),
+        Column("frame_count", pa.int32(), "Frames; 0 when refused."),
+        f.DURATION_S,
+        Column("label", pa.string(), "What is danced or done, from clips.csv or the folder's name."),
+        Column("style", pa.string(), "How it is done, from clips.csv; empty when not said."),
+        Column("subject", pa.string(), "Who was recorded, from clips.csv; empty when not said."),
+        Column("licence", pa.string(), "Licence of the recording, from clips.csv; empty when not said."),
+        f.STATE,
+        f.REASON,
+        Column("joint_count", pa.int32(), "Joints of the source rig; 0 when refused."),
+        Column("metres_per_unit", pa.float64(), "Metres one unit of the file stands for, inferred from body height."),
+        Column("up_axis", pa.string(), "Axis that points up in the file, inferred; empty when refused."),
+        Column("root_offset_rule", pa.string(), "Whether root channels replace the root's OFFSET or add to it."),
+        Column("naming_family", pa.string(), "Which table of joint names fitted, or 'topology'."),
+    ),
+)
+
+SKELETON = Table(
+    name="skeleton",
+    version=1,
+    meaning="One joint of one clip's source skeleton.",
+    key=("clip_id", "joint_index"),
+    columns=(
+        f.CLIP_ID,
+        Column("joint_index", pa.int32(), "Joint, from 0 at the root, parents first."),
+        Column("joint_name", pa.string(), "Name in the source file."),
+        Column("parent_index", pa.int32(), "Joint index of the parent; -1 for the root."),
+        Column("offset_xyz_m", f.VECTOR, "Rest position in the parent's frame."),
+        Column("canonical_joint", pa.string(), "Canonical joint it drives; null when none.", is_optional=True),
+    ),
+)
+
+POSE = Table(
+    name="pose",
+    version=1,
+    meaning="One frame of one clip on its own skeleton, in metres, Y up.",
+    key=("clip_id", "frame_index"),
+    columns=(
+        f.CLIP_ID,
+        f.FRAME_INDEX,
+        f.TIME_S,
+        f.ROOT_XYZ_M,
+        f.ROTATION_WXYZ,
+        Column(
+            "translation_xyz_m",
+            f.VECTORS,
+            "Local position of each joint where the rig moves its joints; null when they stay at their offsets.",
+            is_optional=True,
+        ),
+    ),
+)
+
+CANONICAL_POSE = Table(
+    name="canonical_pose",
+    version=1,
+    meaning="One frame of one clip on the canonical skeleton; schema metadata `joints` has the order.",
+    key=("clip_id", "frame_index"),
+    columns=(f.CLIP_ID, f.FRAME_INDEX, f.TIME_S, f.ROOT_XYZ_M, f.ROTATION_WXYZ, f.POSITION_XYZ_M),
+)
+
+MOTION_BEAT = Table(
+    name="motion_beat",
+    version=1,
+    meaning="One beat of one clip, found by windowed principal components.",
+    key=("clip_id", "beat_index"),
+    columns=(
+        f.CLIP_ID,
+        f.BEAT_INDEX,
+        f.FRAME_INDEX,
+        f.TIME_S,
+        f.CONFIDENCE_RATIO,
+        Column("interval_s", pa.float32(), "Beat interval of the clip."),
+    ),
+)

@@ -1,0 +1,69 @@
+"""Tables of songs: the files and their beats."""
+
+from __future__ import annotations
+
+import pyarrow as pa
+
+from schemas import fields as f
+from schemas.table import Column, Table
+
+SONG = Table(
+    name="song",
+    version=1,
+    meaning="One file of music under songs/.",
+    key=("song_id", "path"),
+    columns=(
+        f.SONG_ID,
+        f.PATH,
+        f.SOURCE_SHA256,
+        Column("kind", pa.string(), "What the file holds.", values=("audio", "midi", "unknown")),
+        f.DURATION_S,
+        Column("sample_rate_hz", pa.int32(), "Samples a second; 0 for MIDI."),
+        Column("channel_count", pa.int32(), "Channels; 0 for MIDI."),
+        Column("tempo_bpm", pa.float32(), "Median tempo of the beats; 0 when there are none."),
+        f.STATE,
+        f.REASON,
+    ),
+)
+
+MUSIC_BEAT = Table(
+    name="music_beat",
+    version=1,
+    meaning="One beat of one song.",
+    key=("song_id", "beat_index"),
+    columns=(
+        f.SONG_ID,
+        f.BEAT_INDEX,
+        f.TIME_S,
+        Column("bar_number", pa.int32(), "Bar, from 1; 0 where bars could not be told."),
+        Column("beat_in_bar_number", pa.int32(), "Beat of its bar, 1 is the downbeat; 0 where bars could not be told."),
+        f.CONFIDENCE_RATIO,
+    ),
+)
+
+MUSIC_TEMPO = Table(
+    name="music_tempo",
+    version=1,
+    meaning="One candidate for the metrical level of a song: the tempo found, half and double of it.",
+    key=("song_id", "level_ratio"),
+    columns=(
+        f.SONG_ID,
+        Column("level_ratio", pa.float32(), "Tempo of the candidate over the tempo chosen: 0.5, 1, 2 …"),
+        Column("tempo_bpm", pa.float32(), "Median tempo of the candidate."),
+        Column("tempo_score", pa.float32(), "Score, comparable within a song; higher is better."),
+        Column("is_chosen", pa.bool_(), "Whether the beat table follows this level."),
+    ),
+)
+
+MUSIC_LOUDNESS = Table(
+    name="music_loudness",
+    version=1,
+    meaning="One instant of a song's loudness curve.",
+    key=("song_id", "time_s"),
+    columns=(
+        f.SONG_ID,
+        f.TIME_S,
+        Column("loudness_db", pa.float32(), "Short-time A-weighted level relative to full scale."),
+        Column("onset_score", pa.float32(), "Onset activation, 0 to 1."),
+    ),
+)
