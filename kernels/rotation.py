@@ -9,14 +9,15 @@ Angles are radians. All functions take any leading axes ``(..., 4)`` and compute
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
+Floats = NDArray[np.float64] | NDArray[np.float32]
 
 IDENTITY: Float = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def normalize(q: ArrayLike) -> Float:
+def normalize(q: Floats) -> Float:
     """Scale to unit length.
 
     Parameters
@@ -33,13 +34,14 @@ def normalize(q: ArrayLike) -> Float:
         If a quaternion is zero or not finite.
     """
     q = np.asarray(q, np.float64)
-    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    length: Float = np.linalg.norm(q, axis=-1, keepdims=True)
     if not (np.isfinite(length).all() and (length > 0).all()):
         raise ValueError("q: want finite quaternions of non-zero length, got a zero or a NaN; check the rotations read")
-    return q / length
+    unit: Float = q / length
+    return unit
 
 
-def mul(a: ArrayLike, b: ArrayLike) -> Float:
+def mul(a: Floats, b: Floats) -> Float:
     """Compose: first ``b``, then ``a``.
 
     Parameters
@@ -63,7 +65,7 @@ def mul(a: ArrayLike, b: ArrayLike) -> Float:
     )
 
 
-def inv(q: ArrayLike) -> Float:
+def inv(q: Floats) -> Float:
     """Invert unit quaternions.
 
     Parameters
@@ -74,10 +76,11 @@ def inv(q: ArrayLike) -> Float:
     -------
     (..., 4) float64
     """
-    return np.asarray(q, np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
+    conjugate: Float = np.asarray(q, np.float64) * np.array([1.0, -1.0, -1.0, -1.0])
+    return conjugate
 
 
-def apply(q: ArrayLike, v: ArrayLike) -> Float:
+def apply(q: Floats, v: Floats) -> Float:
     """Rotate vectors.
 
     Parameters
@@ -96,7 +99,7 @@ def apply(q: ArrayLike, v: ArrayLike) -> Float:
     return v + w * t + np.cross(u, t)
 
 
-def from_axis_angle(axis: ArrayLike, angle_rad: ArrayLike) -> Float:
+def from_axis_angle(axis: Floats, angle_rad: Floats | float) -> Float:
     """Turn by an angle about a unit axis.
 
     Parameters
@@ -113,7 +116,7 @@ def from_axis_angle(axis: ArrayLike, angle_rad: ArrayLike) -> Float:
     return np.concatenate([np.broadcast_to(np.cos(half), (*xyz.shape[:-1], 1)), xyz], axis=-1)
 
 
-def from_euler(angle_rad: ArrayLike, order: str) -> Float:
+def from_euler(angle_rad: Floats | float, order: str) -> Float:
     """Compose intrinsic rotations about the axes of ``order``, first letter outermost.
 
     ``from_euler([a, b, c], "zyx")`` is ``Rz(a) Ry(b) Rx(c)``: the way BVH channels are read from left to right.
@@ -142,7 +145,7 @@ def from_euler(angle_rad: ArrayLike, order: str) -> Float:
     return q
 
 
-def to_matrix(q: ArrayLike) -> Float:
+def to_matrix(q: Floats) -> Float:
     """Write as rotation matrices for column vectors.
 
     Parameters
@@ -157,7 +160,7 @@ def to_matrix(q: ArrayLike) -> Float:
     return np.stack([apply(q, axis) for axis in np.eye(3)], axis=-1)
 
 
-def from_matrix(m: ArrayLike) -> Float:
+def from_matrix(m: Floats) -> Float:
     """Read rotation matrices for column vectors (Shepperd's method: the largest component divides).
 
     Parameters
@@ -182,11 +185,11 @@ def from_matrix(m: ArrayLike) -> Float:
         axis=-2,
     )
     best = np.argmax(np.stack([m00 + m11 + m22, m00, m11, m22], -1), axis=-1)
-    q = normalize(np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :])
-    return np.where(q[..., :1] < 0, -q, q)
+    chosen = normalize(np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :])
+    return np.where(chosen[..., :1] < 0, -chosen, chosen)
 
 
-def log(q: ArrayLike) -> Float:
+def log(q: Floats) -> Float:
     """Rotation vectors: axis times angle, angle in [0, pi].
 
     Parameters
@@ -205,7 +208,7 @@ def log(q: ArrayLike) -> Float:
     return scale * q[..., 1:]
 
 
-def exp(rotation_vector: ArrayLike) -> Float:
+def exp(rotation_vector: Floats) -> Float:
     """Invert :func:`log`.
 
     Parameters
@@ -222,7 +225,7 @@ def exp(rotation_vector: ArrayLike) -> Float:
     return np.concatenate([np.cos(angle / 2), scale * v], axis=-1)
 
 
-def angle_between(a: ArrayLike, b: ArrayLike) -> Float:
+def angle_between(a: Floats, b: Floats) -> Float:
     """Angle of the rotation from ``a`` to ``b``.
 
     Parameters
@@ -236,7 +239,7 @@ def angle_between(a: ArrayLike, b: ArrayLike) -> Float:
     return np.asarray(np.linalg.norm(log(mul(inv(a), b)), axis=-1), np.float64)
 
 
-def slerp(a: ArrayLike, b: ArrayLike, weight: ArrayLike) -> Float:
+def slerp(a: Floats, b: Floats, weight: Floats | float) -> Float:
     """Walk the shorter great arc from ``a`` to ``b``.
 
     Parameters
@@ -248,12 +251,10 @@ def slerp(a: ArrayLike, b: ArrayLike, weight: ArrayLike) -> Float:
     -------
     (..., 4) float64, wxyz, unit
     """
-    a = np.asarray(a, np.float64)
-    weight = np.asarray(weight, np.float64)[..., None]
-    return mul(a, exp(weight * log(mul(inv(a), b))))
+    return mul(a, exp(np.asarray(weight, np.float64)[..., None] * log(mul(inv(a), b))))
 
 
-def between(u: ArrayLike, v: ArrayLike) -> Float:
+def between(u: Floats, v: Floats) -> Float:
     """Shortest rotation that takes direction ``u`` to direction ``v``.
 
     Opposite directions turn by pi about an axis chosen by rule: the one perpendicular to ``u`` that lies closest to
@@ -272,11 +273,9 @@ def between(u: ArrayLike, v: ArrayLike) -> Float:
     ValueError
         If a vector is zero or not finite.
     """
-    u = np.asarray(u, np.float64)
-    v = np.asarray(v, np.float64)
-    u, v = np.broadcast_arrays(u, v)
-    length = np.linalg.norm(u, axis=-1, keepdims=True), np.linalg.norm(v, axis=-1, keepdims=True)
-    if not all(np.isfinite(n).all() and (n > 0).all() for n in length):
+    u, v = np.broadcast_arrays(np.asarray(u, np.float64), np.asarray(v, np.float64))
+    length = np.linalg.norm([u, v], axis=-1, keepdims=True)
+    if not (np.isfinite(length).all() and (length > 0).all()):
         raise ValueError("u, v: want finite directions of non-zero length, got a zero or a NaN")
     u, v = u / length[0], v / length[1]
     w = 1.0 + np.sum(u * v, axis=-1, keepdims=True)
@@ -287,7 +286,7 @@ def between(u: ArrayLike, v: ArrayLike) -> Float:
     return normalize(q)
 
 
-def twist(q: ArrayLike, axis: ArrayLike) -> Float:
+def twist(q: Floats, axis: Floats) -> Float:
     """Part of a rotation about an axis, from the decomposition ``q = swing * twist``.
 
     Parameters
@@ -308,7 +307,7 @@ def twist(q: ArrayLike, axis: ArrayLike) -> Float:
     return np.where(length > 1e-9, t / np.maximum(length, 1e-9), IDENTITY)
 
 
-def continuous(q: ArrayLike) -> Float:
+def continuous(q: Floats) -> Float:
     """Choose signs along the first axis so that each quaternion lies in the hemisphere of the one before.
 
     Parameters
@@ -329,7 +328,7 @@ def continuous(q: ArrayLike) -> Float:
     return q * np.cumprod(flip, axis=0)[..., None]
 
 
-def heading_rad(q: ArrayLike) -> Float:
+def heading_rad(q: Floats) -> Float:
     """Direction a body faces about the vertical: 0 along +Z, pi/2 along +X.
 
     Parameters
@@ -353,7 +352,7 @@ def heading_rad(q: ArrayLike) -> Float:
     return np.where(np.hypot(forward[..., 0], forward[..., 2]) >= 0.5, by_forward, by_left)
 
 
-def from_heading(angle_rad: ArrayLike) -> Float:
+def from_heading(angle_rad: Floats | float) -> Float:
     """Turn about the vertical: the inverse of :func:`heading_rad` for an upright body.
 
     Parameters

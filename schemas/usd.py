@@ -2,8 +2,8 @@
 
 Paths
 -----
-``/Dance`` (SkelRoot, default prim, kind component) holds ``Skeleton``, ``Skeleton/Animation``, ``Body`` (skinned mesh) and
-``Song`` (SpatialAudio).
+``/Dance`` (SkelRoot, default prim, kind component) holds ``Skeleton``,
+``Skeleton/Animation``, ``Body`` (skinned mesh) and ``Song`` (SpatialAudio).
 """
 
 from __future__ import annotations
