@@ -200,12 +200,11 @@ def log(q: Floats) -> Float:
     -------
     (..., 3) float64, radians
     """
-    q = np.asarray(q, np.float64)
-    q = np.where(q[..., :1] < 0, -q, q)
-    sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, q[..., :1])
-    scale = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0)
-    return scale * q[..., 1:]
+    near = np.asarray(q, np.float64) * np.where(np.asarray(q)[..., :1] < 0, -1.0, 1.0)
+    sine = np.linalg.norm(near[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, near[..., :1])
+    vector: Float = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0) * near[..., 1:]
+    return vector
 
 
 def exp(rotation_vector: Floats) -> Float:
