@@ -200,7 +200,8 @@ def log(q: Floats) -> Float:
     -------
     (..., 3) float64, radians
     """
-    near = np.asarray(q, np.float64) * np.where(np.asarray(q)[..., :1] < 0, -1.0, 1.0)
+    unit = np.asarray(q, np.float64)
+    near = unit * np.where(unit[..., :1] < 0, -1.0, 1.0)
     sine = np.linalg.norm(near[..., 1:], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, near[..., :1])
     vector: Float = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0) * near[..., 1:]
