@@ -1,0 +1,1 @@
+"""Made-up dances, songs and studios with known answers."""
