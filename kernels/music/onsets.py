@@ -100,7 +100,7 @@ def band_levels(samples: Samples, sample_rate_hz: float) -> tuple[Float, Float]:
     if not (np.isfinite(sample_rate_hz) and sample_rate_hz > 0):
         raise ValueError(f"sample_rate_hz: want > 0, got {sample_rate_hz}")
     mono = to_mono(samples)
-    window = max(int(round(WINDOW_S * sample_rate_hz)), 8)
+    window = max(round(WINDOW_S * sample_rate_hz), 8)
     n_fft = 1 << (window - 1).bit_length()
     edges = band_edges_hz(N_BANDS, LOWEST_HZ, HIGHEST_HZ)
     edges = edges[: max(int(np.searchsorted(edges, sample_rate_hz / 2, side="right")), 3)]
