@@ -1,0 +1,96 @@
+"""What a clip_id, session or song_id may look like, and how one is made from a path.
+
+A key becomes a partition and a file name, so it is made legal here and nowhere else: lower-case letters, digits and
+single underscores, parts joined by ``-``, at most 80 characters. A key depends on the path alone, never on content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import unicodedata
+from collections.abc import Sequence
+
+LONGEST_KEY = 80
+_LONGEST_SESSION = 32
+_LONGEST_TAKE = LONGEST_KEY - _LONGEST_SESSION - 1
+_PATTERN = re.compile(r"[a-z0-9]+(_[a-z0-9]+)*(-[a-z0-9]+(_[a-z0-9]+)*)*")
+
+
+def is_key(text: str) -> bool:
+    """Whether a text is a legal key."""
+    return len(text) <= LONGEST_KEY and _PATTERN.fullmatch(text) is not None
+
+
+def check_key(text: str) -> str:
+    """Return a legal key as it is, or raise ValueError."""
+    if not is_key(text):
+        raise ValueError(f"key: want lower-case letters, digits, '_' and '-', at most {LONGEST_KEY}, got {text!r}")
+    return text
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+
+
+def slug(text: str, *, longest: int = LONGEST_KEY) -> str:
+    """Make one part of a key from any name.
+
+    Accents are dropped, everything else that is no letter or digit becomes ``_``. Where that loses letters (Japanese,
+    say) or the name is too long, eight characters of its hash keep names apart.
+
+    Parameters
+    ----------
+    text : any string, also empty
+    longest : int, >= 16
+
+    Returns
+    -------
+    str
+        Of ``[a-z0-9]`` and single inner underscores, 1 to ``longest`` characters.
+    """
+    plain = "".join(c for c in unicodedata.normalize("NFKD", text) if not unicodedata.combining(c))
+    part = re.sub(r"[^a-z0-9]+", "_", plain.lower()).strip("_")
+    is_lossy = any(not c.isascii() and c.isalnum() for c in plain)
+    if part and not is_lossy and len(part) <= longest:
+        return part
+    kept = part[: longest - 9].rstrip("_")
+    return f"{kept}_{_hash(text)}" if kept else f"x{_hash(text)}"
+
+
+def session_key(folders: Sequence[str]) -> str:
+    """Key of a session from the names of its folders below ``clips/``; ``clips`` for that folder itself."""
+    key = "-".join(slug(name) for name in folders) or "clips"
+    if len(key) <= _LONGEST_SESSION:
+        return key
+    return f"{key[: _LONGEST_SESSION - 9].rstrip('_-')}_{_hash('/'.join(folders))}"
+
+
+def clip_key(folders: Sequence[str], stem: str) -> str:
+    """Key of a clip: its folder's session key and its own name."""
+    return f"{session_key(folders)}-{slug(stem, longest=_LONGEST_TAKE)}"
+
+
+def song_key(stem: str) -> str:
+    """Key of a song from its file's name without suffix."""
+    return slug(stem)
+
+
+def part_key(session: str, part: int, n_parts: int) -> str:
+    """Key of one part of a session too large for one partition."""
+    width = len(str(n_parts - 1))
+    return f"{session}-part_{part:0{width}d}_of_{n_parts}"
+
+
+def part_of(name: str, n_parts: int) -> int:
+    """Part a clip belongs to, by a hash of its name: the same however many others come and go."""
+    return int(hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8], 16) % n_parts
+
+
+_PART = re.compile(r"(?P<session>.+)-part_\d+_of_(?P<n_parts>\d+)")
+
+
+def parts_in_use(session_keys: Sequence[str]) -> dict[str, int]:
+    """How many parts each split session has, read back from the keys of its parts."""
+    found = (_PART.fullmatch(key) for key in session_keys)
+    return {m["session"]: int(m["n_parts"]) for m in found if m}
