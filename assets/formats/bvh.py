@@ -1,0 +1,180 @@
+"""BVH files, as exporters really write them: bytes to arrays, arrays to a clip in our world, and back.
+
+Conventions
+-----------
+:class:`Bvh` is the file as it stands: its units, its axes, its channels, degrees. :func:`to_clip` brings it to metres,
+Y up, quaternions. Position channels replace OFFSET on every joint but the root, where the file decides (see there).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from assets.formats.bvh_header import parse_header
+from assets.formats.bvh_values import parse_values
+from assets.formats.errors import FormatError
+from kernels.types import Float, Int
+
+MAX_BYTES = 1 << 30
+_COMMON_HZ = (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 150, 180, 200, 240)
+_LONGEST_FRAME_S = 2.0
+_SHORTEST_FRAME_S = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Bvh:
+    """A BVH file as it stands.
+
+    Parameters
+    ----------
+    joints : J names, unique (a repeated name gets ``#2``, ``#3`` …: BVH tells joints apart by place)
+    parent : (J,) int64, topological, the root -1
+    offset : (J, 3) float64, file units
+    channels : per joint, its channels in order: ``Xposition`` … ``Zrotation``, ``Xscale`` …; may be empty
+    end_joint : (E,) int64
+        Joints that carry an End Site.
+    end_offset : (E, 3) float64, file units
+    frame_time_s : float, seconds, as written
+    frame_rate_hz : float, cleaned by :func:`frame_rate_hz`
+    values : (F, C) float64
+        File units and degrees; the channels of all joints side by side.
+    """
+
+    joints: tuple[str, ...]
+    parent: Int
+    offset: Float
+    channels: tuple[tuple[str, ...], ...]
+    end_joint: Int
+    end_offset: Float
+    frame_time_s: float
+    frame_rate_hz: float
+    values: Float
+
+
+def read(path: Path | str, *, max_bytes: int = MAX_BYTES) -> Bvh:
+    """Read a BVH file.
+
+    Parameters
+    ----------
+    path : file
+    max_bytes : int
+        Larger files are refused before they are read.
+
+    Returns
+    -------
+    Bvh
+
+    Raises
+    ------
+    FormatError
+        If the file is too large or not well formed; see :func:`parse`.
+    OSError
+        If it cannot be opened.
+    """
+    path = Path(path)
+    size = path.stat().st_size
+    if size > max_bytes:
+        raise FormatError(
+            str(path),
+            0,
+            f"want at most {max_bytes / 1e6:.0f} MB, got {size / 1e6:.0f} MB; cut the recording into takes",
+        )
+    return parse(path.read_bytes(), str(path))
+
+
+def parse(data: bytes, path: str = "") -> Bvh:
+    """Read the bytes of a BVH file.
+
+    Parameters
+    ----------
+    data : whole file
+        Any line ends, a byte order mark, UTF-8, Shift-JIS or Latin-1 names.
+    path : str
+        Named in messages.
+
+    Returns
+    -------
+    Bvh
+
+    Raises
+    ------
+    FormatError
+        With the line, where the hierarchy is broken, a number is none or not finite, or there are not as many values
+        as the header promises.
+    """
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        data = data.decode("utf-16", "replace").encode()
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if data.endswith(b"\x1a"):
+        data = data[:-1]
+    header = parse_header(data, path)
+    try:
+        rate_hz = frame_rate_hz(header.frame_time_text)
+    except ValueError as error:
+        raise FormatError(path, header.frame_time_line, str(error)) from None
+    n_channels = sum(map(len, header.channels))
+    if n_channels == 0:
+        raise FormatError(path, 0, "want at least one channel, got none; the file holds no motion")
+    values = parse_values(
+        data[header.values_at :], header.frame_count, n_channels, path=path, first_line=header.values_line
+    )
+    return Bvh(
+        joints=header.joints,
+        parent=header.parent,
+        offset=header.offset,
+        channels=header.channels,
+        end_joint=header.end_joint,
+        end_offset=header.end_offset,
+        frame_time_s=float(header.frame_time_text),
+        frame_rate_hz=rate_hz,
+        values=values,
+    )
+
+
+def frame_rate_hz(frame_time_text: str) -> float:
+    """Tell the frame rate that was meant from a frame time as written.
+
+    Parameters
+    ----------
+    frame_time_text : str
+        Seconds, with the digits of the file: they say how far the number can be trusted.
+
+    Returns
+    -------
+    float, Hz
+        A whole number where the frame time is within 0.15 % of one (0.002 % when written with 8 digits or more), or
+        is a common rate (24, 25, 30 … 240) rounded or cut to the digits written. The rates of video, n × 1000 / 1001,
+        where the text has at least 6 digits and is one of them to its last digit: ``0.0417083750417`` is 23.976,
+        while ``0.008342`` is 120. Else one over the frame time.
+
+    Raises
+    ------
+    ValueError
+        If the text is no number, or not between 0.1 ms and 2 s.
+    """
+    try:
+        frame_time_s = float(frame_time_text)
+    except ValueError:
+        frame_time_s = math.nan
+    if not _SHORTEST_FRAME_S <= frame_time_s <= _LONGEST_FRAME_S:
+        slip = "; did you mean milliseconds, or frames a second?" if frame_time_s > _LONGEST_FRAME_S else ""
+        raise ValueError(f"want a Frame Time of 0.0001 to 2 seconds, got {frame_time_text[:40]!r}{slip}")
+    mantissa, _, exponent = frame_time_text.lower().partition("e")
+    n_digits = len(mantissa.replace(".", "").lstrip("+-0"))
+    n_decimals = len(mantissa.partition(".")[2]) - int(exponent or 0)
+    last_digit_s = 1.0000001 * 10.0**-n_decimals
+    rate = 1.0 / frame_time_s
+    whole = max(round(rate), 1)
+    video = whole * 1000 / 1001
+    if n_digits >= 6 and abs(1 / video - frame_time_s) <= min(last_digit_s, 1e-5 * frame_time_s):
+        return video
+    if abs(whole * frame_time_s - 1.0) <= (0.0015 if n_digits < 8 else 2e-5):
+        return float(whole)
+    rounded = [common for common in _COMMON_HZ if abs(1.0 / common - frame_time_s) <= last_digit_s]
+    if rounded and n_digits < 8:
+        return float(min(rounded, key=lambda common: abs(common - rate)))
+    return rate
