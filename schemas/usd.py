@@ -2,8 +2,8 @@
 
 Paths
 -----
-``/Dance`` (SkelRoot, default prim, kind component) holds ``Skeleton``,
-``Skeleton/Animation``, ``Body`` (skinned mesh) and ``Song`` (SpatialAudio).
+``/Dance`` (SkelRoot, default prim, kind component) holds ``Skeleton``, ``Skeleton/Animation``, ``Body`` (skinned mesh
+with one GeomSubset a side), ``Looks`` (one material a side) and, where there is music, ``Song`` (SpatialAudio).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ ROOT_PATH = "/Dance"
 SKELETON_PATH = "/Dance/Skeleton"
 ANIMATION_PATH = "/Dance/Skeleton/Animation"
 MESH_PATH = "/Dance/Body"
+LOOKS_PATH = "/Dance/Looks"
 AUDIO_PATH = "/Dance/Song"
 
 UP_AXIS = "Y"
@@ -19,5 +20,9 @@ METERS_PER_UNIT = 1.0
 START_TIME_CODE = 0.0
 DEFAULT_FRAME_RATE_HZ = 30.0
 
-# Keys of the default prim's customData.
+# What is packed into a .usdz: the stage comes first, its music lies beside it.
+PACKAGE_ALIGNMENT_BYTES = 64
+PACKAGE_AUDIO_SUFFIX = ".wav"
+
+# Key of the default prim's customData that holds the provenance.
 PROVENANCE_KEY = "odori"
