@@ -89,5 +89,7 @@ MOTION_BEAT = Table(
         f.TIME_S,
         f.CONFIDENCE_RATIO,
         Column("interval_s", pa.float32(), "Beat interval of the clip."),
+        Column("component_share_ratio", pa.float32(), "Share of the clip's variance that the beat's component carries."),
+        Column("peak_share_ratio", pa.float32(), "Share of the beat curve's spectrum inside its peak."),
     ),
 )

@@ -11,9 +11,7 @@ from typing import Any
 
 
 def key(default: Any, meaning: str) -> Any:  # noqa: ANN401 - a default may be of any type
-    """Declare one setting; a mutable default is copied for each record."""
-    if isinstance(default, dict):
-        return field(default_factory=default.copy, metadata={"meaning": meaning})
+    """Declare one setting."""
     return field(default=default, metadata={"meaning": meaning})
 
 
@@ -82,7 +80,10 @@ class Settings:
     """``odori.toml``, every key with a default."""
 
     limits: Limits = field(default_factory=Limits)
-    joints: dict[str, str] = key({}, "Names of a rig's joints to canonical joints, where odori cannot tell.")
+    joints: dict[str, str] = field(
+        default_factory=dict,
+        metadata={"meaning": "Names of a rig's joints to canonical joints, where odori cannot tell."},
+    )
     motion_beat: MotionBeatSettings = field(default_factory=MotionBeatSettings)
     music_beat: MusicBeatSettings = field(default_factory=MusicBeatSettings)
     motion_graph: MotionGraphSettings = field(default_factory=MotionGraphSettings)

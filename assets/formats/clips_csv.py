@@ -1,0 +1,106 @@
+"""``clips.csv``: what a studio says of its clips, one row a file."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from assets.formats.errors import FormatError
+
+# Column names read for each fact, first one present wins; the first is ours.
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "file": ("file", "path", "path_in_zip", "filename", "clip"),
+    "label": ("label", "content", "class"),
+    "style": ("style", "kind"),
+    "subject": ("subject", "person", "performer", "actor"),
+    "licence": ("licence", "license"),
+}
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of one clip; empty texts where nothing was said."""
+
+    label: str = ""
+    style: str = ""
+    subject: str = ""
+    licence: str = ""
+
+
+def is_clips_csv(name: str) -> bool:
+    """Whether a file of this name says things of clips: ``clips.csv``, ``labels.csv``, ``labels_….csv``."""
+    lower = name.lower()
+    return lower == "clips.csv" or (lower.startswith("labels") and lower.endswith(".csv"))
+
+
+def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
+    """Read the rows of a ``clips.csv``.
+
+    Parameters
+    ----------
+    data : bytes
+        UTF-8, with or without a byte-order mark; a header row with at least a file column (see :data:`COLUMNS`).
+    path : str
+        Named in errors.
+
+    Returns
+    -------
+    dict
+        From the file as written, with ``/`` between folders, to its facts. Empty when there are no rows.
+
+    Raises
+    ------
+    FormatError
+        If it is not UTF-8, has no file column, or names a file twice with different facts.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FormatError(path, 0, f"want UTF-8, got byte {error.object[error.start]:#x}; save it as UTF-8") from error
+    rows = csv.DictReader(io.StringIO(text, newline=""), skipinitialspace=True)
+    try:
+        header = [name.strip().lower() for name in rows.fieldnames or [] if name is not None]
+        rows.fieldnames = header
+        chosen = {fact: next((c for c in names if c in header), None) for fact, names in COLUMNS.items()}
+        if chosen["file"] is None:
+            raise FormatError(
+                path, 1, f"want a column 'file', got {', '.join(header) or 'nothing'}; name the columns in row 1"
+            )
+        facts: dict[str, Facts] = {}
+        for row in rows:
+            file = (row.get(chosen["file"]) or "").strip().replace("\\", "/")
+            if not file:
+                continue
+            said = Facts(**{k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"})
+            if facts.setdefault(file, said) != said:
+                raise FormatError(path, rows.line_num, f"want each file once, got {file!r} again with other facts")
+    except csv.Error as error:
+        raise FormatError(path, rows.line_num, f"want comma-separated values, got {error}") from error
+    return facts
+
+
+def look_up(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> Facts | None:
+    """Find what a ``clips.csv`` says of a file.
+
+    Rows may name the file alone or with some of its folders: the longest row that the file's path ends with counts.
+
+    Parameters
+    ----------
+    facts : from :func:`parse`
+    folders, name : the file's path, below ``clips/``
+
+    Returns
+    -------
+    Facts or None
+        None when no row names it.
+    """
+    parts = [*folders, name]
+    for start in range(len(parts)):
+        found = facts.get("/".join(parts[start:]))
+        if found is not None:
+            return found
+    # A row may also carry folders the studio does not have: data sets list their files from their own root.
+    endings = [key for key in facts if key.rsplit("/", 1)[-1] == name]
+    return facts[endings[0]] if len(endings) == 1 else None

@@ -1,0 +1,266 @@
+"""Which recordings and songs a studio has: their keys, hashes, labels, and what is wrong with them.
+
+Policy only: what is a source, which session it belongs to, which of two files that want one key gets it. Reading a
+recording's content is the business of the capture and music areas.
+"""
+
+import hashlib
+import json
+import time
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+from assets.formats import clips_csv, settings, tree
+from assets.formats.clips_csv import Facts
+from assets.formats.errors import FormatError
+from assets.formats.tree import File, HashCache
+from schemas.keys import clip_key, part_key, part_of, parts_in_use, session_key, song_key
+from schemas.settings import Brief, Settings
+
+MOTION_SUFFIXES = (".bvh",)
+AUDIO_SUFFIXES = (".wav", ".flac", ".ogg", ".mp3")
+MIDI_SUFFIXES = (".mid", ".midi")
+# Said beside sources, not sources themselves.
+DOCUMENT_SUFFIXES = (".txt", ".md", ".pdf", ".json", ".toml", ".csv", ".beats", ".html", ".rtf", ".copyright", "")
+LARGEST_SESSION = 256
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A motion file of the studio.
+
+    Parameters
+    ----------
+    key, session : its clip_id and the partition it lies in
+    path : relative to the studio
+    sha256 : of its bytes; empty where it was not read
+    facts : label, style, subject, licence
+    problem : why it is refused before it is opened; empty when it is not
+    """
+
+    key: str
+    session: str
+    path: str
+    sha256: str
+    facts: Facts
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class Song:
+    """A music file of the studio; ``brief`` is its brief's path, empty when there is none."""
+
+    key: str
+    path: str
+    sha256: str
+    kind: str
+    brief: str = ""
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Everything found under one studio, and what was odd about the folder itself."""
+
+    clips: tuple[Clip, ...]
+    songs: tuple[Song, ...]
+    notes: tuple[str, ...] = ()
+
+    def sessions(self) -> dict[str, tuple[Clip, ...]]:
+        """Clips by session, both in order."""
+        found: dict[str, list[Clip]] = defaultdict(list)
+        for clip in self.clips:
+            found[clip.session].append(clip)
+        return {session: tuple(found[session]) for session in sorted(found)}
+
+    def song(self, key: str) -> Song:
+        """Find the song of a key, the readable one where two files want the key; KeyError when there is none."""
+        found = sorted((song for song in self.songs if song.key == key), key=lambda song: bool(song.problem))
+        if not found:
+            raise KeyError(key)
+        return found[0]
+
+    def songs_by_key(self) -> dict[str, tuple[Song, ...]]:
+        """Songs by key: more than one where two files want it."""
+        found: dict[str, list[Song]] = defaultdict(list)
+        for song in self.songs:
+            found[song.key].append(song)
+        return {key: tuple(found[key]) for key in sorted(found)}
+
+
+class Studio(Protocol):
+    """What assets ask of a studio folder."""
+
+    def sources(self) -> Sources:
+        """List what is there, hashed."""
+        ...
+
+    def settings(self) -> Settings:
+        """Read ``odori.toml``."""
+        ...
+
+    def brief(self, song: Song) -> Brief:
+        """Read a song's brief; every default where it has none."""
+        ...
+
+    def file(self, path: str) -> Path:
+        """Place of a source on disk."""
+        ...
+
+
+def fingerprint(facts: object) -> str:
+    """Hash of anything JSON can hold: 16 hexadecimal characters."""
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def session_version(clips: Iterable[Clip]) -> str:
+    """Version of a session's sources: which files, with which bytes, labelled how."""
+    return fingerprint(
+        [[c.path, c.sha256, c.facts.label, c.facts.style, c.facts.subject, c.facts.licence, c.problem] for c in clips]
+    )
+
+
+def song_version(songs: Iterable[Song]) -> str:
+    """Version of a song's sources."""
+    return fingerprint([[s.path, s.sha256, s.problem] for s in songs])
+
+
+def scan(studio: Path, limits: Settings, *, sessions_in_use: Iterable[str] = (), cache: HashCache) -> Sources:
+    """Find the sources of a studio.
+
+    Parameters
+    ----------
+    studio : the folder with ``clips/`` and ``songs/``
+    limits : settings; its size limits count
+    sessions_in_use : keys of sessions stored so far, so that a split session keeps its parts
+    cache : remembered hashes
+
+    Returns
+    -------
+    Sources
+        In order of path. Empty when both folders are missing or empty.
+    """
+    now_ns = time.time_ns()
+    notes: list[str] = []
+    clips = _clips(studio, limits, dict(parts_in_use(list(sessions_in_use))), cache, now_ns, notes)
+    songs = _songs(studio, limits, cache, now_ns)
+    cache.save()
+    return Sources(tuple(clips), tuple(songs), tuple(notes))
+
+
+def _clips(
+    studio: Path, limits: Settings, known_parts: Mapping[str, int], cache: HashCache, now_ns: int, notes: list[str]
+) -> list[Clip]:
+    root = studio / "clips"
+    files = tree.walk(root)
+    facts = _facts(root, [f for f in files if clips_csv.is_clips_csv(f.name)], notes)
+    sources = [f for f in files if f.suffix not in DOCUMENT_SUFFIXES]
+    by_folder: dict[tuple[str, ...], list[File]] = defaultdict(list)
+    for file in sources:
+        by_folder[file.folders].append(file)
+    taken: dict[str, str] = {}
+    clips = []
+    for folders in sorted(by_folder):
+        folder_key = session_key(folders)
+        n_parts = _n_parts(len(by_folder[folders]), known_parts.get(folder_key, 1))
+        for file in by_folder[folders]:
+            key = clip_key(folders, file.stem)
+            session = part_key(folder_key, part_of(file.name, n_parts), n_parts) if n_parts > 1 else folder_key
+            path = f"clips/{file.path}"
+            problem = _unreadable(file, MOTION_SUFFIXES, limits.limits.largest_clip_mb, "a BVH file (.bvh)")
+            digest = "" if problem else cache.sha256(root, file, now_ns)
+            if not problem and taken.setdefault(key, path) != path:
+                problem = f"want its own key, got {key!r}, which {taken[key]} has; rename one of the two files"
+            clips.append(Clip(key, session, path, digest, _facts_of(facts, file), problem))
+    return clips
+
+
+def _n_parts(n_files: int, in_use: int) -> int:
+    """Parts of a folder: as many as it has, unless it outgrew or far undergrew them."""
+    if in_use > 1 and 32 * in_use <= n_files <= 200 * in_use:
+        return in_use
+    n_parts = 1
+    while n_files > (LARGEST_SESSION if n_parts == 1 else 100 * n_parts):
+        n_parts *= 2
+    return n_parts
+
+
+def _facts(root: Path, files: Iterable[File], notes: list[str]) -> list[tuple[tuple[str, ...], dict[str, Facts]]]:
+    """Read the ``clips.csv`` files, the nearest folder's first."""
+    said = []
+    for file in files:
+        try:
+            said.append((file.folders, clips_csv.parse((root / file.path).read_bytes(), f"clips/{file.path}")))
+        except (FormatError, OSError) as error:
+            notes.append(f"{error}; its labels are left out")
+    return sorted(said, key=lambda entry: -len(entry[0]))
+
+
+def _facts_of(said: Iterable[tuple[tuple[str, ...], dict[str, Facts]]], file: File) -> Facts:
+    fallback = file.folders[-1] if file.folders else "clips"
+    for folders, facts in said:
+        if file.folders[: len(folders)] == folders:
+            found = clips_csv.look_up(facts, file.folders, file.name)
+            if found is not None:
+                return found if found.label else replace(found, label=fallback)
+    return Facts(label=fallback)
+
+
+def _unreadable(file: File, suffixes: tuple[str, ...], largest_mb: float, wanted: str) -> str:
+    if file.suffix not in suffixes:
+        return f"want {wanted}, got {file.suffix!r}; export or unpack it as one"
+    if file.size > largest_mb * 1e6:
+        return f"want at most {largest_mb:g} MB, got {file.size / 1e6:.0f} MB; cut it, or raise the limit in odori.toml"
+    return ""
+
+
+def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int) -> list[Song]:
+    root = studio / "songs"
+    files = tree.walk(root)
+    briefs = {f.path for f in files if f.name.endswith(".brief.toml")}
+    sources = [f for f in files if f.suffix not in DOCUMENT_SUFFIXES]
+    order = {suffix: i for i, suffix in enumerate(AUDIO_SUFFIXES + MIDI_SUFFIXES)}
+    # One stem in several formats: audio keeps the plain key, the rest say their format: `a.wav` and `a.mid` both live.
+    sources.sort(key=lambda f: (order.get(f.suffix, len(order)), f.path))
+    taken: dict[str, File] = {}
+    songs = []
+    for file in sources:
+        kind = "audio" if file.suffix in AUDIO_SUFFIXES else "midi" if file.suffix in MIDI_SUFFIXES else "unknown"
+        problem = _unreadable(
+            file,
+            AUDIO_SUFFIXES + MIDI_SUFFIXES,
+            limits.limits.largest_song_mb,
+            f"audio ({', '.join(AUDIO_SUFFIXES)}) or MIDI (.mid)",
+        )
+        key = song_key(file.stem)
+        if not problem:
+            other = taken.get(key)
+            if other is not None and other.suffix != file.suffix:
+                key = song_key(f"{file.stem}_{file.suffix[1:]}")
+            other = taken.setdefault(key, file)
+            if other is not file:
+                problem = f"want its own key, got {key!r}, which songs/{other.path} has; rename one of the two files"
+        brief = next((b for b in (f"{file.path}.brief.toml", _sibling(file, "brief.toml")) if b in briefs), "")
+        songs.append(
+            Song(
+                key,
+                f"songs/{file.path}",
+                "" if problem else cache.sha256(root, file, now_ns),
+                kind,
+                f"songs/{brief}" if brief else "",
+                problem,
+            )
+        )
+    return sorted(songs, key=lambda s: s.path)
+
+
+def _sibling(file: File, ending: str) -> str:
+    return "/".join([*file.folders, f"{file.stem}.{ending}"])
+
+
+def read_brief(studio: Studio, song: Song) -> Brief:
+    """Read the brief a song came with; every default where there is none."""
+    return settings.read_brief(studio.file(song.brief)) if song.brief else Brief()
