@@ -264,3 +264,21 @@ def _sibling(file: File, ending: str) -> str:
 def read_brief(studio: Studio, song: Song) -> Brief:
     """Read the brief a song came with; every default where there is none."""
     return settings.read_brief(studio.file(song.brief)) if song.brief else Brief()
+
+
+def brief_version(studio: Studio, songs: Iterable[Song]) -> str:
+    """Version of what the briefs of a song say, the beats file they name included."""
+    said = []
+    for song in songs:
+        if not song.brief:
+            continue
+        place = studio.file(song.brief)
+        said.append(tree.sha256(place))
+        try:
+            beats = settings.read_brief(place).beats.file
+        except FormatError:
+            continue
+        beats_place = place.parent / beats
+        if beats and beats_place.is_file():
+            said.append(tree.sha256(beats_place))
+    return fingerprint(said)

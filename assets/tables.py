@@ -15,9 +15,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from kernels.assembly.blend import Dance, Lineage
+from kernels.assembly.quality import Measure
 from kernels.motion.beats import MotionBeats
 from kernels.types import BeatGrid, Choreography, Clip, Float, Int, MotionGraph, Skeleton
-from schemas import choreography as dance_tables
 from schemas.choreography import CHOREOGRAPHY, DANCE_POSE, DANCE_QUALITY, FRAME_LINEAGE
 from schemas.fields import QUATERNION, VECTOR
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
@@ -73,7 +74,9 @@ def vectors(values: Float) -> pa.Array:
 
 def vector(values: Float) -> pa.Array:
     """Pack (F, 3) as one fixed-size list a row, float32."""
-    return pa.FixedSizeListArray.from_arrays(pa.array(np.ascontiguousarray(values, np.float32).reshape(-1)), type=VECTOR)
+    return pa.FixedSizeListArray.from_arrays(
+        pa.array(np.ascontiguousarray(values, np.float32).reshape(-1)), type=VECTOR
+    )
 
 
 def to_array(column: pa.ChunkedArray) -> Float:
@@ -348,9 +351,86 @@ def from_choreography(song_id: str, method: str, steps: Choreography, costs: Map
 
 def to_choreography(rows: pa.Table) -> Choreography:
     """Unpack a choreography."""
+    seconds = {c: to_numbers(rows[c]).astype(np.float64) for c in _STEP_SECONDS}
     return Choreography(
-        tuple(rows["clip_id"].to_pylist()),
-        *(to_numbers(rows[c]).astype(np.float64) for c in ("song_start_s", "song_end_s", "clip_start_s", "clip_end_s")),
-        to_numbers(rows["has_seam"]).astype(bool),
-        to_numbers(rows["blend_s"]).astype(np.float64),
+        clip_id=tuple(rows["clip_id"].to_pylist()), has_seam=to_numbers(rows["has_seam"]).astype(bool), **seconds
+    )
+
+
+_STEP_SECONDS = ("song_start_s", "song_end_s", "clip_start_s", "clip_end_s", "blend_s")
+
+
+def from_dance_pose(song_id: str, method: str, dance: Dance, joints: Sequence[str]) -> pa.Table:
+    """Pack the frames of a dance, F rows; the joints' order goes into the schema metadata."""
+    f = len(dance.root_xyz_m)
+    columns = [
+        pa.array([song_id] * f, pa.string()),
+        pa.array([method] * f, pa.string()),
+        pa.array(np.arange(f), pa.int32()),
+        pa.array(dance.time_s),
+        vector(dance.root_xyz_m),
+        vectors(dance.rotation_wxyz),
+        vectors(dance.position_xyz_m),
+    ]
+    table = DANCE_POSE.check(pa.table(columns, schema=DANCE_POSE.arrow))
+    return DANCE_POSE.with_metadata(table, {"joints": ",".join(joints)})
+
+
+def from_frame_lineage(song_id: str, method: str, dance: Dance, steps: Choreography) -> pa.Table:
+    """Pack where every frame of a dance comes from, F rows."""
+    line = dance.lineage
+    f = len(line.step_index)
+    alone = line.blend_step_index < 0
+    names = np.array(steps.clip_id, object)
+    columns = [
+        pa.array([song_id] * f, pa.string()),
+        pa.array([method] * f, pa.string()),
+        pa.array(np.arange(f), pa.int32()),
+        pa.array(dance.time_s),
+        pa.array(names[line.step_index].tolist(), pa.string()),
+        pa.array(line.clip_time_s),
+        pa.array(np.where(alone, None, names[line.blend_step_index]).tolist(), pa.string()),
+        pa.array(line.blend_time_s, pa.float64(), mask=alone),
+        pa.array(np.where(alone, 0.0, line.blend_weight), pa.float32()),
+        pa.array(steps.warp_ratio[line.step_index], pa.float32()),
+    ]
+    return FRAME_LINEAGE.check(pa.table(columns, schema=FRAME_LINEAGE.arrow))
+
+
+def to_dance(pose: pa.Table, lineage: pa.Table, steps: Choreography) -> Dance:
+    """Unpack a dance; the steps of its lineage are found again by song time."""
+    time_s = to_numbers(pose["time_s"])
+    rate_hz = float(np.round((len(time_s) - 1) / time_s[-1], 6)) if len(time_s) > 1 else 1.0
+    step = np.clip(np.searchsorted(steps.song_start_s, time_s + 1e-9, side="right") - 1, 0, len(steps.clip_id) - 1)
+    blend_time_s = lineage["blend_time_s"].to_numpy()
+    return Dance(
+        rate_hz,
+        to_array(pose["root_xyz_m"]),
+        to_array(pose["rotation_wxyz"]),
+        to_array(pose["position_xyz_m"]),
+        Lineage(
+            step,
+            to_numbers(lineage["clip_time_s"]),
+            np.where(np.isnan(blend_time_s), -1, step),
+            blend_time_s,
+            to_numbers(lineage["blend_weight_ratio"]).astype(np.float64),
+        ),
+    )
+
+
+def from_dance_quality(song_id: str, method: str, measures: Iterable[Measure]) -> pa.Table:
+    """Pack the measures of a dance, one row each."""
+    return from_rows(
+        DANCE_QUALITY,
+        [
+            {
+                "song_id": song_id,
+                "method_name": method,
+                "metric_name": m.name,
+                "value": m.value if np.isfinite(m.value) else None,
+                "wanted": m.wanted,
+                "is_passed": m.is_passed,
+            }
+            for m in measures
+        ],
     )

@@ -1,0 +1,281 @@
+"""What was built from what: versions of content, and rows carried over instead of computed again.
+
+Conventions
+-----------
+Every stored partition carries a *stamp*: the code version, the settings and the input versions it was made from, the
+version of its own content, and for tables of several clips the same two per clip. Versions are hashes of content, so
+an upstream rebuild with equal bytes leaves everything after it fresh. Stamps hold no date, run or path.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import dagster as dg
+import pyarrow as pa
+
+from assets import tables
+from schemas.table import Table
+
+SETTINGS_KEY = "odori/settings"
+SOURCES_KEY = "odori/sources"
+
+
+@dataclass(frozen=True)
+class ClipStamp:
+    """Versions of one clip's rows: what they were made from, and what they are."""
+
+    made_from: str
+    content: str
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """What one stored partition was made from, and what it is."""
+
+    code_version: str
+    settings: str
+    inputs: Mapping[str, str]
+    content: str
+    clips: Mapping[str, ClipStamp] = field(default_factory=dict)
+
+    def to_json(self) -> str:
+        """Write as JSON, keys in order."""
+        clips = {clip: [s.made_from, s.content] for clip, s in self.clips.items()}
+        return json.dumps(
+            {
+                "code_version": self.code_version,
+                "settings": self.settings,
+                "inputs": dict(self.inputs),
+                "content": self.content,
+                "clips": clips,
+            },
+            sort_keys=True,
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> "Stamp":
+        """Read what :meth:`to_json` wrote."""
+        data = json.loads(text)
+        clips = {clip: ClipStamp(*versions) for clip, versions in data["clips"].items()}
+        return cls(data["code_version"], data["settings"], data["inputs"], data["content"], clips)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One partition of an asset, ready to be stored.
+
+    Parameters
+    ----------
+    key : partition key; empty for an asset without partitions
+    table : its rows
+    sources : version of the source files, for assets made from them; else empty
+    clips : stamps by clip, where rows are carried over by clip
+    metadata : what a person wants to see
+    """
+
+    key: str
+    table: pa.Table
+    sources: str = ""
+    clips: Mapping[str, ClipStamp] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Partitions of an asset, made one after the other while they are stored, so that one at a time is in memory."""
+
+    each: Iterable[Part]
+
+
+class Stored(Protocol):
+    """An upstream asset on disk: partitions read one at a time, or rows of a few clips."""
+
+    @property
+    def keys(self) -> Sequence[str]:
+        """Partition keys that are part of this run, in order."""
+        ...
+
+    def read(self, key: str = "", *, clip_ids: Iterable[str] | None = None) -> pa.Table:
+        """Read one partition, or only some clips of it."""
+        ...
+
+    def stamp(self, key: str = "") -> Stamp:
+        """Read what the partition was made from and is."""
+        ...
+
+
+class Earlier(Protocol):
+    """What the lake held before this run."""
+
+    def table(self, asset: str, key: str) -> pa.Table | None:
+        """Rows stored earlier; None when there are none or they have another shape."""
+        ...
+
+    def stamp(self, asset: str, key: str) -> Stamp | None:
+        """Stamp stored earlier; None when there is none."""
+        ...
+
+
+class Progress(Protocol):
+    """Told how far a long step is."""
+
+    def begin(self, what: str, total: int) -> None:
+        """Start counting."""
+        ...
+
+    def step(self) -> None:
+        """One more is done."""
+        ...
+
+
+def content_version(table: pa.Table) -> str:
+    """Hash of a table's rows and types, metadata left out: 16 hexadecimal characters."""
+    digest = hashlib.sha256(str(table.schema.remove_metadata()).encode())
+    sink = _HashSink(digest)
+    plain = table.replace_schema_metadata(None).combine_chunks()
+    with pa.ipc.new_stream(pa.PythonFile(sink, mode="w"), plain.schema) as writer:
+        writer.write_table(plain)
+    return digest.hexdigest()[:16]
+
+
+class _HashSink:
+    """File object that hashes what is written to it."""
+
+    def __init__(self, digest: Any) -> None:  # noqa: ANN401 - hashlib has no public type
+        self._digest = digest
+        self._length = 0
+        self.closed = False
+
+    def write(self, data: bytes) -> int:
+        self._digest.update(data)
+        self._length += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._length
+
+    def flush(self) -> None:
+        pass
+
+    def close(self) -> None:
+        self.closed = True
+
+    def readable(self) -> bool:
+        return False
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return False
+
+
+def version_of(*parts: str) -> str:
+    """Hash of versions in order."""
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def code_version(context: dg.AssetExecutionContext, asset: str) -> str:
+    """Code version of an asset of this run."""
+    return context.assets_def.code_versions_by_key[dg.AssetKey(asset)] or ""
+
+
+def per_clip(
+    table: Table,
+    key: str,
+    made_from: Mapping[str, str],
+    compute: Callable[[str], pa.Table],
+    *,
+    earlier: Earlier,
+    progress: Progress | None = None,
+) -> Part:
+    """Make one session's table clip by clip, carrying over the rows of clips made from the same before.
+
+    Parameters
+    ----------
+    table : the table's declaration
+    key : session
+    made_from : by clip_id in the order of rows, the version of all a clip's rows depend on (inputs, code, settings)
+    compute : makes one clip's rows; not called for clips carried over
+    earlier : what the lake holds
+    progress : told of every clip, carried or computed
+
+    Returns
+    -------
+    Part
+        With stamps by clip and the counts ``computed_clips`` and ``carried_clips`` in its metadata.
+    """
+    stamp = earlier.stamp(table.name, key)
+    known = stamp.clips if stamp else {}
+    unchanged = {clip for clip, version in made_from.items() if clip in known and known[clip].made_from == version}
+    before = earlier.table(table.name, key) if unchanged else None
+    rows = tables.by_clip(before) if before is not None else {}
+    parts, stamps, n_computed = [], {}, 0
+    for clip, version in made_from.items():
+        # A clip of no rows leaves none to carry, but its stamp says so.
+        is_carried = clip in unchanged and before is not None
+        part = rows.get(clip, table.empty()) if is_carried else compute(clip)
+        content = known[clip].content if is_carried else content_version(part)
+        n_computed += not is_carried
+        stamps[clip] = ClipStamp(version, content)
+        parts.append(part)
+        if progress:
+            progress.step()
+    metadata = {"computed_clips": n_computed, "carried_clips": len(made_from) - n_computed}
+    return Part(key, _joined(table, parts), clips=stamps, metadata=metadata)
+
+
+def _joined(table: Table, parts: Sequence[pa.Table]) -> pa.Table:
+    filled = [p for p in parts if p.num_rows] or list(parts[:1])
+    return tables.concat(table, filled)
+
+
+def each_session(upstream: Stored, make: Callable[[str], Part]) -> Iterator[Part]:
+    """Make a part for every session of this run."""
+    for key in upstream.keys:
+        yield make(key)
+
+
+def clip_versions(stored: Stored, key: str, *also: str) -> dict[str, str]:
+    """Version of what each clip's rows are made from: its content upstream, and ``also`` (code, settings)."""
+    return {clip: version_of(stamp.content, *also) for clip, stamp in stored.stamp(key).clips.items()}
+
+
+def declared(
+    table: Table, *, group: str, code_version: str, settings: str = "", sources: str = "", io_manager: str = "lake"
+) -> dict[str, Any]:
+    """Arguments of an asset that stores a declared table: its name, meaning, columns and versions, said once.
+
+    Parameters
+    ----------
+    table : the declaration; also the asset's name
+    group : area of the asset graph
+    code_version : raised by hand when the meaning of the output changes
+    settings : sections of ``odori.toml`` it reads, separated by spaces
+    sources : "clips" or "song" when it reads source files of its partition
+    io_manager : who stores it
+    """
+    return {
+        "group_name": group,
+        "code_version": code_version,
+        "description": table.meaning,
+        "metadata": {
+            "dagster/column_schema": column_schema(table),
+            SETTINGS_KEY: settings,
+            SOURCES_KEY: sources,
+        },
+        "io_manager_key": io_manager,
+    }
+
+
+def column_schema(table: Table) -> dg.TableSchema:
+    """Columns of a table as Dagster's UI shows them."""
+    columns = []
+    for column in table.columns:
+        meaning = f"{column.meaning} [{column.unit}]" if column.unit else column.meaning
+        constraints = dg.TableColumnConstraints(nullable=column.is_optional, unique=table.key == (column.name,))
+        columns.append(dg.TableColumn(column.name, str(column.type), meaning, constraints))
+    return dg.TableSchema(columns)

@@ -1,0 +1,31 @@
+"""How the asset graph is cut: by capture session, by song, by song and method."""
+
+import dagster as dg
+
+SESSION = dg.DynamicPartitionsDefinition(name="session")
+SONG = dg.DynamicPartitionsDefinition(name="song")
+METHODS = ("graph",)
+METHOD = dg.StaticPartitionsDefinition(list(METHODS))
+DANCE = dg.MultiPartitionsDefinition({"song": SONG, "method": METHOD})
+EVERY = dg.AllPartitionMapping()
+
+
+def dance_key(song: str, method: str) -> str:
+    """Partition key of a song danced with a method."""
+    return str(dg.MultiPartitionKey({"song": song, "method": method}))
+
+
+def song_and_method(key: str) -> tuple[str, str]:
+    """Song and method of a dance's partition key; Dagster joins them in the order of the dimensions' names."""
+    method, song = key.split("|")
+    return song, method
+
+
+def lake_key(key: str) -> str:
+    """Name of a partition's file: a dance's names the song first."""
+    return "|".join(song_and_method(key)) if "|" in key else key
+
+
+def dagster_key(key: str) -> str:
+    """Invert :func:`lake_key`."""
+    return dance_key(*key.split("|")) if "|" in key else key

@@ -1,0 +1,209 @@
+"""What is fresh, stale or missing, by content: the one place that decides what has to run.
+
+Every stored partition's stamp is compared with what it would be made from now: code version, settings, versions of its
+inputs. Inputs count by content, so an upstream rebuild with equal bytes leaves what follows fresh. The command, the
+sensor, the schedule and ``odori status`` all ask here.
+"""
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import dagster as dg
+
+from assets import sources as source_kinds
+from assets.lineage import SETTINGS_KEY, SOURCES_KEY, Stamp, version_of
+from assets.partitions import METHODS, song_and_method
+from assets.sources import Sources, Studio
+from pipelines.lake import Lake
+
+Kind = Literal["session", "song", "dance", "whole"]
+State = Literal["fresh", "stale", "missing", "waiting"]
+
+
+@dataclass(frozen=True)
+class Node:
+    """One asset as freshness sees it."""
+
+    name: str
+    group: str
+    kind: Kind
+    code_version: str
+    inputs: tuple[str, ...]
+    settings: tuple[str, ...]
+    sources: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """State of one partition of one asset, and why."""
+
+    asset: str
+    key: str
+    state: State
+    why: str = ""
+
+
+def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
+    """Read the asset graph, in an order in which inputs come first."""
+    found: dict[str, Node] = {}
+    for definition in assets:
+        for spec in definition.specs:
+            found[spec.key.to_user_string()] = Node(
+                spec.key.to_user_string(),
+                spec.group_name or "",
+                _kind(spec.partitions_def),
+                spec.code_version or "",
+                tuple(sorted(dep.asset_key.to_user_string() for dep in spec.deps)),
+                tuple(str(spec.metadata.get(SETTINGS_KEY, "")).split()),
+                str(spec.metadata.get(SOURCES_KEY, "")),
+            )
+    ordered: dict[str, Node] = {}
+    while len(ordered) < len(found):
+        ready = [n for n in found.values() if n.name not in ordered and all(i in ordered for i in n.inputs)]
+        ordered |= {n.name: n for n in ready}
+    return ordered
+
+
+def _kind(partitions: dg.PartitionsDefinition | None) -> Kind:
+    if isinstance(partitions, dg.MultiPartitionsDefinition):
+        return "dance"
+    if isinstance(partitions, dg.DynamicPartitionsDefinition):
+        return "song" if partitions.name == "song" else "session"
+    return "whole"
+
+
+class Freshness:
+    """States of a studio's assets.
+
+    Parameters
+    ----------
+    assets : nodes by name, inputs first
+    lake, studio : where results and sources are
+    """
+
+    def __init__(self, assets: Mapping[str, Node], lake: Lake, studio: Studio) -> None:
+        self.assets = assets
+        self._lake = lake
+        self._studio = studio
+        self._stamps: dict[tuple[str, str], Stamp | None] = {}
+
+    @cached_property
+    def sources(self) -> Sources:
+        """The sources as they were when first asked for."""
+        return self._studio.sources()
+
+    def forget(self) -> None:
+        """Look at the lake anew."""
+        self._stamps.clear()
+
+    def stamp(self, asset: str, key: str) -> Stamp | None:
+        """Stamp of a stored partition, read once."""
+        if (asset, key) not in self._stamps:
+            self._stamps[asset, key] = self._lake.stamp(asset, key)
+        return self._stamps[asset, key]
+
+    def keys(self, kind: Kind) -> list[str]:
+        """Partitions there should be; of dances, those asked for so far."""
+        if kind == "session":
+            return list(self.sources.sessions())
+        if kind == "song":
+            return list(self.sources.songs_by_key())
+        if kind == "dance":
+            songs = set(self.keys("song"))
+            return [k for k in self._lake.keys("choreography") if k.split("|")[0] in songs]
+        return [""]
+
+    def settings_version(self, asset: str) -> str:
+        """Version of the settings an asset reads."""
+        settings = dataclasses.asdict(self._studio.settings())
+        return source_kinds.fingerprint({section: settings[section] for section in self.assets[asset].settings})
+
+    def source_version(self, asset: str, key: str) -> str:
+        """Version of the source files an asset reads; empty when it reads none."""
+        kind = self.assets[asset].sources
+        if kind == "clips":
+            return source_kinds.session_version(self.sources.sessions().get(key, ()))
+        if kind == "song":
+            songs = self.sources.songs_by_key().get(key, ())
+            brief = source_kinds.brief_version(self._studio, songs)
+            return version_of(source_kinds.song_version(songs), brief)
+        return ""
+
+    def inputs(self, asset: str, key: str) -> dict[str, str] | None:
+        """Versions an asset's partition would be made from now; None while an input is not there."""
+        node = self.assets[asset]
+        versions = {}
+        for name in node.inputs:
+            stamps = [(k, self.stamp(name, k)) for k in self._input_keys(node.kind, self.assets[name].kind, name, key)]
+            if any(stamp is None for _, stamp in stamps):
+                return None
+            versions[name] = version_of(*(f"{k}:{stamp.content}" for k, stamp in stamps if stamp))
+        return versions
+
+    def _input_keys(self, kind: Kind, of: Kind, name: str, key: str) -> Sequence[str]:
+        if of == "whole":
+            return [""]
+        if of == kind:
+            return [key]
+        if kind == "dance" and of == "song":
+            return [key.split("|")[0]]
+        return self.keys(of)
+
+    def state(self, asset: str, key: str, *, pending: Iterable[tuple[str, str]] = ()) -> Finding:
+        """State of one partition; ``pending`` are partitions known not to be fresh."""
+        node = self.assets[asset]
+        inputs = self.inputs(asset, key)
+        waits = set(pending)
+        for name in node.inputs:
+            if any((name, k) in waits for k in self._input_keys(node.kind, self.assets[name].kind, name, key)):
+                return Finding(asset, key, "waiting", f"{name} has to be made first")
+        if inputs is None:
+            return Finding(asset, key, "waiting", "an input has to be made first")
+        stamp = self.stamp(asset, key)
+        if stamp is None:
+            return Finding(asset, key, "missing", "never made")
+        if stamp.code_version != node.code_version:
+            return Finding(asset, key, "stale", f"code version {stamp.code_version} is now {node.code_version}")
+        if stamp.settings != self.settings_version(asset):
+            return Finding(asset, key, "stale", f"settings [{'], ['.join(node.settings)}] changed")
+        expected = inputs | ({"sources": self.source_version(asset, key)} if node.sources else {})
+        changed = sorted(name for name in expected if stamp.inputs.get(name) != expected[name])
+        if changed:
+            return Finding(asset, key, "stale", f"{', '.join(changed)} changed")
+        return Finding(asset, key, "fresh")
+
+    def findings(self, groups: Iterable[str] | None = None) -> list[Finding]:
+        """State of every partition of every asset, or of some groups, inputs first."""
+        wanted = set(groups) if groups is not None else None
+        found: list[Finding] = []
+        pending: set[tuple[str, str]] = set()
+        for node in self.assets.values():
+            for key in self.keys(node.kind):
+                finding = self.state(node.name, key, pending=pending)
+                if finding.state != "fresh":
+                    pending.add((node.name, key))
+                if wanted is None or node.group in wanted:
+                    found.append(finding)
+        return found
+
+    def orphans(self) -> list[tuple[str, str]]:
+        """List stored partitions whose source is gone."""
+        found = []
+        for node in self.assets.values():
+            if node.kind in ("session", "song"):
+                wanted = set(self.keys(node.kind))
+                found += [(node.name, k) for k in self._lake.keys(node.name) if k not in wanted]
+            if node.kind == "dance":
+                songs = set(self.keys("song"))
+                found += [
+                    (node.name, k)
+                    for k in self._lake.keys(node.name)
+                    if k.split("|")[0] not in songs or k.split("|")[-1] not in METHODS
+                ]
+        return found
+
+
+__all__ = ["Finding", "Freshness", "Node", "nodes", "song_and_method"]

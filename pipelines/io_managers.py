@@ -1,0 +1,109 @@
+"""Who reads and writes the lake for Dagster: tables by partition, stamped; and stages.
+
+Assets return tables or records, never paths; only this module and the lake know paths.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import dagster as dg
+import pyarrow as pa
+
+from assets.lineage import Part, Parts, Stamp, content_version
+from assets.partitions import dagster_key, lake_key
+from pipelines.freshness import Freshness
+from pipelines.lake import Lake, LakeError
+from schemas.catalog import TABLES
+
+
+class StoredTable:
+    """An upstream asset on disk; see :class:`assets.lineage.Stored`."""
+
+    def __init__(self, lake: Lake, asset: str, keys: Sequence[str]) -> None:
+        self._lake, self._asset, self._keys = lake, asset, list(keys)
+
+    @property
+    def keys(self) -> Sequence[str]:
+        """Partition keys that are part of this run, in order."""
+        return self._keys
+
+    def read(self, key: str = "", *, clip_ids: Iterable[str] | None = None) -> pa.Table:
+        """Read one partition, or only some clips of it."""
+        return self._lake.table(self._asset, key, clip_ids=clip_ids)
+
+    def stamp(self, key: str = "") -> Stamp:
+        """Read the stamp of a stored partition."""
+        stamp = self._lake.stamp(self._asset, key)
+        if stamp is None:
+            raise LakeError(f"{self._asset}: the partition {key!r} is not built; run 'odori build'")
+        return stamp
+
+
+class EarlierTables:
+    """What the lake held before; see :class:`assets.lineage.Earlier`."""
+
+    def __init__(self, lake: Lake) -> None:
+        self._lake = lake
+
+    def table(self, asset: str, key: str) -> pa.Table | None:
+        """Rows stored earlier; None when there are none or they cannot be read."""
+        try:
+            return self._lake.table(asset, key)
+        except LakeError:
+            return None
+
+    def stamp(self, asset: str, key: str) -> Stamp | None:
+        """Stamp stored earlier."""
+        return self._lake.stamp(asset, key)
+
+
+class LakeIOManager(dg.IOManager):
+    """Stores :class:`~assets.lineage.Parts` or a table; loads a table, or a handle where one is annotated."""
+
+    def __init__(self, lake: Lake, freshness: Freshness) -> None:
+        self._lake, self._freshness = lake, freshness
+
+    def handle_output(self, context: dg.OutputContext, obj: pa.Table | Part | Parts) -> None:
+        """Store every part with its stamp, and tell Dagster what a person wants to see of it."""
+        asset = context.asset_key.to_user_string()
+        keys = [lake_key(k) for k in context.asset_partition_keys] if context.has_asset_partitions else [""]
+        stored = {part.key: self._store(asset, part) for part in _parts(obj, keys)}
+        missing = sorted(set(keys) - set(stored))
+        if missing:
+            raise LakeError(f"{asset}: want the partitions {', '.join(keys)}, {', '.join(missing)} did not come")
+        for key, metadata in stored.items():
+            if len(keys) == 1:
+                context.add_output_metadata(metadata)
+            else:
+                context.step_context.add_asset_metadata(metadata, context.asset_key, dagster_key(key))
+
+    def _store(self, asset: str, part: Part) -> dict[str, Any]:
+        table = TABLES[asset].check(part.table)
+        self._freshness.forget()
+        inputs = self._freshness.inputs(asset, part.key) or {}
+        if part.sources:
+            inputs = inputs | {"sources": part.sources}
+        stamp = Stamp(
+            self._freshness.assets[asset].code_version,
+            self._freshness.settings_version(asset),
+            inputs,
+            content_version(table),
+            part.clips,
+        )
+        self._lake.write(asset, part.key, table, stamp)
+        return {"dagster/row_count": table.num_rows, "content_version": stamp.content, **part.metadata}
+
+    def load_input(self, context: dg.InputContext) -> pa.Table | StoredTable:
+        """Load a table where the asset asks for one, else a handle on the stored partitions."""
+        asset = context.asset_key.to_user_string()
+        keys = [lake_key(k) for k in context.asset_partition_keys] if context.has_asset_partitions else [""]
+        stored = StoredTable(self._lake, asset, keys)
+        if context.dagster_type.typing_type is pa.Table:
+            return stored.read(keys[0])
+        return stored
+
+
+def _parts(obj: pa.Table | Part | Parts, keys: Sequence[str]) -> Iterable[Part]:
+    if isinstance(obj, Parts):
+        return obj.each
+    return [obj if isinstance(obj, Part) else Part(keys[0], obj)]

@@ -1,0 +1,154 @@
+"""The lake on disk: ``<lake>/<table>/<partition>.parquet``, each file with its stamp in the footer.
+
+The only place that writes Parquet. A file is written beside and renamed, so a killed run leaves the old one or the new
+one. Files of one table and content are byte-equal.
+"""
+
+import contextlib
+import errno
+import os
+import uuid
+from collections.abc import Callable, Iterable, Mapping
+from typing import IO, Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from upath import UPath
+
+from assets import tables
+from assets.lineage import Stamp
+from schemas.catalog import TABLES
+
+STAMP_KEY = b"odori"
+WHOLE = "all"
+_MADE_BESIDE = ".tmp-"
+
+
+class LakeError(Exception):
+    """The lake cannot be read or written; the message says which file, why, and what to do."""
+
+
+class Lake:
+    """Tables of a studio.
+
+    Parameters
+    ----------
+    root : absolute path or URL that fsspec knows
+    """
+
+    def __init__(self, root: UPath) -> None:
+        self.root = root
+
+    def path(self, asset: str, key: str = "") -> UPath:
+        """Place of a stored partition; of the whole table when the key is empty."""
+        return self.root / asset / f"{key or WHOLE}.parquet"
+
+    def keys(self, asset: str) -> list[str]:
+        """Partitions stored, sorted; empty when there are none."""
+        folder = self.root / asset
+        if not folder.is_dir():
+            return []
+        return sorted(p.name.removesuffix(".parquet") for p in folder.iterdir() if p.name.endswith(".parquet"))
+
+    def stamp(self, asset: str, key: str = "") -> Stamp | None:
+        """Stamp of a stored partition; None when it is not stored or was written by something else."""
+        try:
+            with self.path(asset, key).open("rb") as file:
+                metadata = pq.read_schema(file).metadata or {}
+            if metadata.get(b"version", b"").decode() != str(TABLES[asset].version):
+                return None
+            return Stamp.from_json(metadata[STAMP_KEY].decode())
+        except (FileNotFoundError, KeyError, ValueError, pa.ArrowInvalid, OSError):
+            return None
+
+    def table(self, asset: str, key: str = "", *, clip_ids: Iterable[str] | None = None) -> pa.Table:
+        """Read a stored partition, or some clips of it.
+
+        Raises
+        ------
+        LakeError
+            If it is not stored, or is no table of this kind.
+        """
+        path = self.path(asset, key)
+        filters = None if clip_ids is None else [("clip_id", "in", sorted(clip_ids))]
+        try:
+            with path.open("rb") as file:
+                table = pq.read_table(file, filters=filters)
+            return TABLES[asset].check(table)
+        except FileNotFoundError as error:
+            raise LakeError(f"{path.name}: the table {asset} is not built for it; run 'odori build'") from error
+        except (ValueError, pa.ArrowInvalid) as error:
+            raise LakeError(f"{asset}/{path.name}: {error}; delete the file and run 'odori build'") from error
+
+    def write(self, asset: str, key: str, table: pa.Table, stamp: Stamp) -> None:
+        """Store a partition, rows of one clip in one row group.
+
+        Raises
+        ------
+        LakeError
+            If the disk is full, read-only or otherwise refuses; nothing stored before is touched.
+        """
+        table = table.replace_schema_metadata({**(table.schema.metadata or {}), STAMP_KEY: stamp.to_json().encode()})
+        write_beside(self.path(asset, key), lambda file: _write_parquet(table, file))
+
+    def remove(self, asset: str, key: str) -> None:
+        """Forget a partition; nothing happens when it is not stored."""
+        self.path(asset, key).unlink(missing_ok=True)
+
+    def sweep(self) -> int:
+        """Delete what killed runs left beside; how many files that were."""
+        found = [p for p in self.root.glob("*/*") if p.name.startswith(_MADE_BESIDE)] if self.root.is_dir() else []
+        for path in found:
+            path.unlink(missing_ok=True)
+        return len(found)
+
+
+def _write_parquet(table: pa.Table, file: IO[bytes]) -> None:
+    is_framewise = "frame_index" in table.schema.names and "clip_id" in table.schema.names
+    parts = list(tables.by_clip(table).values()) if is_framewise and table.num_rows else [table]
+    if len(parts) > LONGEST_ROW_GROUPS:
+        parts = [table]
+    with pq.ParquetWriter(
+        file, table.schema, compression="zstd", use_dictionary=["clip_id"] if is_framewise else True
+    ) as out:
+        for part in parts:
+            out.write_table(part, row_group_size=max(part.num_rows, 1))
+
+
+LONGEST_ROW_GROUPS = 4096
+
+_WHY: Mapping[int, str] = {
+    errno.ENOSPC: "the disk is full; free some space and run it again",
+    errno.EDQUOT: "the disk quota is used up; free some space and run it again",
+    errno.EROFS: "the disk is read-only; name a studio that can be written to",
+    errno.EACCES: "writing is not allowed there; mend the folder's permissions",
+    errno.EPERM: "writing is not allowed there; mend the folder's permissions",
+}
+
+
+def why(error: OSError) -> str:
+    """Say what a refused write means and what to do about it."""
+    return _WHY.get(error.errno or 0, f"{error.strerror or error}; see to the disk and run it again")
+
+
+def write_beside(path: Any, write: Callable[[IO[bytes]], None]) -> None:  # noqa: ANN401 - pathlib or universal path
+    """Write a file beside its place and rename it, so that there is never half of one.
+
+    Raises
+    ------
+    LakeError
+        If the disk refuses; the old file, if any, stays.
+    """
+    beside = path.with_name(f"{_MADE_BESIDE}{uuid.uuid4().hex}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with beside.open("wb") as file:
+            write(file)
+            file.flush()
+            if hasattr(file, "fileno") and type(path).__module__ != "upath.core":
+                os.fsync(file.fileno())
+        beside.replace(path) if hasattr(beside, "replace") else beside.rename(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
+        raise LakeError(f"{path}: cannot be written: {why(error)}") from error
