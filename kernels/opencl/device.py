@@ -1,0 +1,108 @@
+"""Which OpenCL devices there are, and picking one of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyopencl as cl
+
+
+@dataclass(frozen=True)
+class DeviceInfo:
+    """One device as a person sees it.
+
+    Parameters
+    ----------
+    index : int, from 0, in the order of platforms and their devices
+    name, platform, driver : str, as the driver says
+    kind : "GPU", "CPU" or "other"
+    memory_bytes : int, global memory
+    """
+
+    index: int
+    name: str
+    platform: str
+    driver: str
+    kind: str
+    memory_bytes: int
+
+    def __str__(self) -> str:
+        return f"{self.index}: {self.name} ({self.kind}, {self.platform})"
+
+
+def list_devices() -> list[cl.Device]:
+    """Find every OpenCL device, platforms in the loader's order.
+
+    Returns
+    -------
+    list of cl.Device; empty where no driver is installed
+    """
+    try:
+        platforms = cl.get_platforms()
+    except cl.Error:  # the loader's way of saying that there is no driver
+        return []
+    devices = []
+    for platform in platforms:
+        try:
+            devices += platform.get_devices()
+        except cl.Error:  # a platform without a device says so by an error
+            continue
+    return devices
+
+
+def describe_devices() -> list[DeviceInfo]:
+    """Describe every device, in the order of :func:`list_devices`; empty where no driver is installed."""
+    return [
+        DeviceInfo(
+            index=index,
+            name=device.name.strip(),
+            platform=device.platform.name.strip(),
+            driver=device.driver_version.strip(),
+            kind=_kind(device),
+            memory_bytes=int(device.global_mem_size),
+        )
+        for index, device in enumerate(list_devices())
+    ]
+
+
+def pick_device(wanted: str | int | None = None) -> cl.Device:
+    """Pick a device by index, by name, or by rule.
+
+    Parameters
+    ----------
+    wanted : int, str or None
+        An index of :func:`list_devices` (also as a string of digits); or a part of a device's or its platform's name,
+        upper and lower case alike, first match; or None: the first GPU, else the first CPU, else the first of all.
+
+    Returns
+    -------
+    cl.Device
+
+    Raises
+    ------
+    LookupError
+        If there is no device at all, or none is as wanted; the message lists what is there. Never another device.
+    """
+    devices = list_devices()
+    if not devices:
+        raise LookupError(
+            "device: want an OpenCL device, found none; install a driver (pocl-binary-distribution brings one "
+            "for the CPU) or choose the reference backend"
+        )
+    if wanted is None or wanted == "":
+        return min(devices, key=lambda device: ("GPU", "CPU", "other").index(_kind(device)))
+    if isinstance(wanted, int) or wanted.isdecimal():
+        if 0 <= int(wanted) < len(devices):
+            return devices[int(wanted)]
+    else:
+        for device in devices:
+            if wanted.casefold() in f"{device.name} {device.platform.name}".casefold():
+                return device
+    there = "; ".join(str(info) for info in describe_devices())
+    raise LookupError(f"device: want {wanted!r}, found only {there}; name one of these by index or part of its name")
+
+
+def _kind(device: cl.Device) -> str:
+    if device.type & cl.device_type.GPU:
+        return "GPU"
+    return "CPU" if device.type & cl.device_type.CPU else "other"
