@@ -24,7 +24,7 @@ SIDES: tuple[str, ...] = ("middle", "left", "right")
 
 # Joint, without its side: the joint its part reaches to, half widths in metres at both ends, depth over width.
 _LIMBS: dict[str, tuple[str, float, float, float]] = {
-    "hips": ("spine", 0.150, 0.125, 0.70),
+    "hips": ("spine", 0.160, 0.125, 0.70),
     "spine": ("chest", 0.125, 0.135, 0.70),
     "chest": ("upperChest", 0.135, 0.155, 0.70),
     "upperChest": ("neck", 0.165, 0.080, 0.66),
@@ -32,8 +32,8 @@ _LIMBS: dict[str, tuple[str, float, float, float]] = {
     "Shoulder": ("UpperArm", 0.045, 0.056, 1.0),
     "UpperArm": ("LowerArm", 0.052, 0.040, 1.0),
     "LowerArm": ("Hand", 0.040, 0.028, 1.0),
-    "UpperLeg": ("LowerLeg", 0.086, 0.060, 1.0),
-    "LowerLeg": ("Foot", 0.060, 0.040, 1.0),
+    "UpperLeg": ("LowerLeg", 0.082, 0.058, 1.0),
+    "LowerLeg": ("Foot", 0.058, 0.040, 1.0),
 }
 _PLAIN_RATIO = 0.12  # half width over length of a limb without a name
 _PLAIN_M = (0.008, 0.060)  # and its bounds
@@ -76,21 +76,23 @@ def body(skeleton: Skeleton) -> Body:
     """
     rest = rest_position(skeleton)
     scale = _scale(skeleton)
-    points, normals, triangles, joint_index, side_index = [], [], [], [], []
-    n_points = 0
-    for joint, mesh in _parts(skeleton, rest, scale):
-        points.append(np.asarray(mesh.vertices))
-        normals.append(np.asarray(mesh.vertex_normals))
-        triangles.append(np.asarray(mesh.faces, np.int64) + n_points)
-        joint_index.append(np.full(len(mesh.vertices), joint))
-        side_index.append(np.full(len(mesh.faces), _side(skeleton.joints[joint], rest[joint], scale)))
-        n_points += len(mesh.vertices)
+    parts = _parts(skeleton, rest, scale)
+    n_points = [len(mesh.vertices) for _, mesh in parts]
+    n_triangles = [len(mesh.faces) for _, mesh in parts]
+    joint = np.array([joint for joint, _ in parts])
+    side = np.array([_side(skeleton.joints[k], rest[k], scale) for k in joint])
+    first = np.repeat(np.cumsum([0, *n_points[:-1]]), n_triangles)
+    whole = trimesh.Trimesh(
+        np.concatenate([mesh.vertices for _, mesh in parts]),
+        np.concatenate([mesh.faces for _, mesh in parts]) + first[:, None],
+        process=False,
+    )
     return Body(
-        point_xyz_m=np.concatenate(points),
-        normal_xyz=np.concatenate(normals),
-        triangle=np.concatenate(triangles),
-        joint_index=np.concatenate(joint_index),
-        side_index=np.concatenate(side_index),
+        point_xyz_m=np.array(whole.vertices),
+        normal_xyz=np.array(whole.vertex_normals),
+        triangle=np.array(whole.faces, np.int64),
+        joint_index=np.repeat(joint, n_points),
+        side_index=np.repeat(side, n_triangles),
     )
 
 
@@ -268,14 +270,9 @@ def _lathe(radius: Float, height: Float, start: Float, frame: Float, depth_ratio
 
 
 def _mesh(points: Float, triangles: NDArray[np.int64]) -> trimesh.Trimesh:
-    """Make a mesh whose vertices stay as given, in number and order."""
-    mesh = trimesh.Trimesh(points, triangles, process=False)
-    used = np.unique(triangles)
-    if len(used) < len(points):
-        renumber = np.zeros(len(points), np.int64)
-        renumber[used] = np.arange(len(used))
-        mesh = trimesh.Trimesh(points[used], renumber[triangles], process=False)
-    return mesh
+    """Make a mesh of the points in use, in their order."""
+    used, triangles_used = np.unique(triangles, return_inverse=True)
+    return trimesh.Trimesh(points[used], triangles_used.reshape(triangles.shape), process=False)
 
 
 def _frame(along: Float) -> Float:

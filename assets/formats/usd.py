@@ -12,8 +12,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import struct
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -21,7 +19,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdMedia, UsdShade, UsdSkel, Vt
 
-from assets.formats.errors import FormatError
+from assets.formats import usd_read
 from assets.formats.mesh import SIDES, Body, body
 from kernels import rotation
 from kernels.skeleton import kinematics
@@ -35,7 +33,6 @@ SIDE_RGB: dict[str, tuple[float, float, float]] = {
     "right": (0.01, 0.17, 0.45),
 }
 _UNIT_ATOL = 1e-3
-_ZIP_HEADER_BYTES = 30
 
 
 def write_stage(
@@ -83,122 +80,7 @@ def write_stage(
         _write_audio(stage, audio)
     with Sdf.ChangeBlock():
         write_animation(layer, clip)
-    _export(layer, path)
-
-
-def write_package(path: str | Path, stage: str | Path) -> None:
-    """Pack a stage and the song it names into one .usdz.
-
-    Parameters
-    ----------
-    path : ends in .usdz; folders are made
-    stage : path of a stage written by :func:`write_stage`
-
-    Raises
-    ------
-    ValueError
-        If the suffix does not fit.
-    FormatError
-        If the stage cannot be read, or its song is missing or no WAV.
-    OSError
-        If the file cannot be written; what stood at ``path`` before still stands.
-    """
-    path, stage = Path(path), Path(stage)
-    if path.suffix != ".usdz":
-        raise ValueError(f"path: want a name ending in .usdz, got {path.name!r}")
-    layer = _open_layer(stage)
-    members: list[tuple[str, bytes]] = []
-    song = layer.GetAttributeAtPath(contract.AUDIO_PATH + ".filePath")
-    if song is not None:
-        source = stage.parent / song.default.path
-        name = re.sub(r"[^A-Za-z0-9._-]", "_", source.name)
-        song.default = Sdf.AssetPath("./" + name)
-        members.append((name, _read_wave(source)))
-    with _written_beside(path) as partial:
-        scratch = partial.with_suffix(".usdc")
-        try:
-            _export(layer, scratch)
-            members.insert(0, ("dance.usdc", scratch.read_bytes()))
-        finally:
-            scratch.unlink(missing_ok=True)
-        _zip(partial, members)
-
-
-def read_animation(path: str | Path) -> Clip:
-    """Read the dance of a stage back.
-
-    Parameters
-    ----------
-    path : .usd, .usda, .usdc or .usdz with one animated skeleton, Y up
-
-    Returns
-    -------
-    Clip
-        In metres, on the stage's own joints; one frame a time sample of the rotations.
-
-    Raises
-    ------
-    FormatError
-        If there is no such stage, no bound animation, or the skeleton has no single root.
-    """
-    stage = open_stage(path)
-    if UsdGeom.GetStageUpAxis(stage) != contract.UP_AXIS:
-        raise FormatError(str(path), 0, f"upAxis: want {contract.UP_AXIS}, got {UsdGeom.GetStageUpAxis(stage)}")
-    query = _animated_skeleton(stage)
-    if query is None:
-        raise FormatError(str(path), 0, "want a skeleton with a bound animation, got none; check skel:animationSource")
-    times = query.GetAnimQuery().GetJointTransformTimeSamples() or [Usd.TimeCode.Default()]
-    local = np.array([np.array(query.ComputeJointLocalTransforms(time)) for time in times], np.float64)
-    metres = UsdGeom.GetStageMetersPerUnit(stage)
-    try:
-        skeleton = _read_skeleton(query, metres)
-        scale = np.linalg.norm(local[..., :3, :3], axis=-1, keepdims=True)
-        translation = local[..., 3, :3] * metres
-        is_rigid = np.allclose(translation[:, 1:], skeleton.offset_xyz_m[1:], atol=1e-6)
-        # USD multiplies rows by matrices: its rotations are the transposes of ours.
-        quaternion = rotation.from_matrix(np.swapaxes(local[..., :3, :3] / scale, -1, -2))
-        return Clip(
-            skeleton,
-            stage.GetTimeCodesPerSecond(),
-            translation[:, 0],
-            rotation.continuous(quaternion),
-            None if is_rigid else translation,
-        )
-    except ValueError as error:
-        raise FormatError(str(path), 0, str(error)) from error
-
-
-def read_provenance(path: str | Path) -> dict[str, object]:
-    """Read the provenance of a stage, {} where there is none; lists come back as lists.
-
-    Raises
-    ------
-    FormatError
-        If the stage cannot be opened.
-    """
-    stage = open_stage(path)
-    root = stage.GetDefaultPrim()
-    stored = root.GetCustomDataByKey(contract.PROVENANCE_KEY) if root else None
-    return {key: _from_usd(value) for key, value in stored.items()} if isinstance(stored, dict) else {}
-
-
-def open_stage(path: str | Path) -> Usd.Stage:
-    """Open a stage, whatever the file is.
-
-    Raises
-    ------
-    FormatError
-        If it is missing, empty, or not USD.
-    """
-    layer_path = Path(path)
-    if not layer_path.is_file():
-        raise FormatError(str(path), 0, "want a file, got none")
-    if layer_path.stat().st_size == 0:
-        raise FormatError(str(path), 0, "want a USD stage, got an empty file")
-    try:
-        return Usd.Stage.Open(str(path))
-    except Tf.ErrorException as error:
-        raise FormatError(str(path), 0, f"want a USD stage, got a file USD cannot open: {_reason(error)}") from error
+    export(layer, path)
 
 
 def joint_paths(skeleton: Skeleton) -> list[str]:
@@ -398,60 +280,8 @@ def _to_usd(value: object, name: str) -> object:
         raise ValueError(f"{name}: want what JSON can hold, got {type(value).__name__}") from error
 
 
-def _from_usd(value: object) -> object:
-    """Turn customData into plain Python."""
-    if isinstance(value, dict):
-        return {key: _from_usd(item) for key, item in value.items()}
-    if isinstance(value, Vt.StringArray | Vt.IntArray | Vt.DoubleArray):
-        return list(value)
-    return value
-
-
-def _animated_skeleton(stage: Usd.Stage) -> UsdSkel.SkeletonQuery | None:
-    """Find the first skeleton under a SkelRoot whose animation can be asked."""
-    cache = UsdSkel.Cache()
-    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
-        if not prim.IsA(UsdSkel.Root):
-            continue
-        root = UsdSkel.Root(prim)
-        cache.Populate(root, Usd.TraverseInstanceProxies())
-        for binding in cache.ComputeSkelBindings(root, Usd.TraverseInstanceProxies()):
-            query = cache.GetSkelQuery(binding.GetSkeleton())
-            if query and query.GetAnimQuery():
-                return query
-    return None
-
-
-def _read_skeleton(query: UsdSkel.SkeletonQuery, metres: float) -> Skeleton:
-    """Read joints, parents and rest offsets."""
-    paths = [str(path) for path in query.GetJointOrder()]
-    names = [str(name) for name in query.GetSkeleton().GetJointNamesAttr().Get() or ()]
-    leaves = [path.rsplit("/")[-1] for path in paths]
-    if len(names) != len(paths):
-        names = leaves if len(set(leaves)) == len(leaves) else paths
-    rest = np.array(query.ComputeJointLocalTransforms(Usd.TimeCode.Default(), True), np.float64)
-    parent = np.array(query.GetTopology().GetParentIndices(), np.int64)
-    return Skeleton(tuple(names), parent, rest[:, 3, :3] * metres)
-
-
-def _open_layer(path: Path) -> Sdf.Layer:
-    """Open one layer apart from any other holder of the same file."""
-    open_stage(path)
-    return Sdf.Layer.OpenAsAnonymous(str(path))
-
-
-def _read_wave(path: Path) -> bytes:
-    """Bytes of a WAV file."""
-    if not path.is_file():
-        raise FormatError(str(path), 0, "want the song the stage names, got no such file; write it first")
-    data = path.read_bytes()
-    if data[:4] not in (b"RIFF", b"RF64") or data[8:12] != b"WAVE":
-        raise FormatError(str(path), 0, "want a WAV file, got something else; a .usdz may hold no other kind we write")
-    return data
-
-
 @contextmanager
-def _written_beside(path: Path) -> Iterator[Path]:
+def written_beside(path: Path) -> Iterator[Path]:
     """Give a place to write, renamed to ``path`` at the end and removed where that fails."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
@@ -465,32 +295,12 @@ def _written_beside(path: Path) -> Iterator[Path]:
         partial.unlink(missing_ok=True)
 
 
-def _export(layer: Sdf.Layer, path: Path) -> None:
+def export(layer: Sdf.Layer, path: Path) -> None:
     """Write a layer, whole or not at all."""
-    with _written_beside(path) as partial:
+    with written_beside(path) as partial:
         try:
             is_written = layer.Export(str(partial))
         except Tf.ErrorException as error:
-            raise OSError(_reason(error)) from error
+            raise OSError(usd_read.reason(error)) from error
         if not is_written:
             raise OSError("USD wrote nothing")
-
-
-def _reason(error: Tf.ErrorException) -> str:
-    """Return the first thing USD says, without where in USD it says it."""
-    first = next((line for line in str(error).splitlines() if line.strip()), "no reason given")
-    return first.split(" : ", 1)[-1].strip().strip("'")
-
-
-def _zip(path: Path, members: list[tuple[str, bytes]]) -> None:
-    """Write a .usdz: stored, dated 1980, each member's bytes on a 64-byte boundary."""
-    align = contract.PACKAGE_ALIGNMENT_BYTES
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as package:
-        for name, data in members:
-            info = zipfile.ZipInfo(name, date_time=(1980, 1, 1, 0, 0, 0))
-            info.create_system, info.external_attr = 3, 0o644 << 16
-            start = package.start_dir + _ZIP_HEADER_BYTES + len(name.encode())
-            # A field of its own kind that pads; it has a header of 4 bytes itself.
-            pad = -(start + 4) % align
-            info.extra = struct.pack("<HH", 0x1986, pad) + bytes(pad)
-            package.writestr(info, data)
