@@ -162,16 +162,13 @@ def pose_distance(rows: PoseFeatures, columns: PoseFeatures) -> Float:
     """
     check_pair(rows, columns)
     distance = np.zeros((len(rows), len(columns)))
+    (a, p), (b, q) = _by_coordinate(rows), _by_coordinate(columns)
     for r in range(0, len(rows), _TILE_ROWS):
-        row = rows.take(slice(r, r + _TILE_ROWS))
+        row = slice(r, r + _TILE_ROWS)
         for c in range(0, len(columns), _TILE_COLUMNS):
-            column = columns.take(slice(c, c + _TILE_COLUMNS))
-            distance[r : r + _TILE_ROWS, c : c + _TILE_COLUMNS] = _sum(
-                row.linear.T[:, :, None].copy(),
-                column.linear.T[:, None, :].copy(),
-                row.quaternion_wxyz.transpose(1, 2, 0)[..., None].copy(),
-                column.quaternion_wxyz.transpose(1, 2, 0)[:, :, None, :].copy(),
-                rows.quaternion_weight,
+            column = slice(c, c + _TILE_COLUMNS)
+            distance[row, column] = _sum(
+                a[:, row, None], b[:, None, column], p[:, :, row, None], q[:, :, None, column], rows.quaternion_weight
             )
     return distance
 
@@ -195,13 +192,13 @@ def paired_distance(first: PoseFeatures, second: PoseFeatures) -> Float:
     check_pair(first, second)
     if len(first) != len(second):
         raise ValueError(f"second: want {len(first)} poses as the first has, got {len(second)}")
-    return _sum(
-        first.linear.T,
-        second.linear.T,
-        first.quaternion_wxyz.transpose(1, 2, 0),
-        second.quaternion_wxyz.transpose(1, 2, 0),
-        first.quaternion_weight,
-    )
+    (a, p), (b, q) = _by_coordinate(first), _by_coordinate(second)
+    return _sum(a, b, p, q, first.quaternion_weight)
+
+
+def _by_coordinate(poses: PoseFeatures) -> tuple[Float, Float]:
+    """Coordinates first, poses last: (D, N) and (K, 4, N), contiguous."""
+    return np.ascontiguousarray(poses.linear.T), np.ascontiguousarray(poses.quaternion_wxyz.transpose(1, 2, 0))
 
 
 def _sum(a: Float, b: Float, p: Float, q: Float, weight: Float) -> Float:

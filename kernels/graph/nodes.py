@@ -1,0 +1,107 @@
+"""The beats of all clips as nodes, and where a dance may leave one and enter another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.types import Float, Int
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class BeatNodes:
+    """Every beat of every clip.
+
+    Parameters
+    ----------
+    clip_index : (N,) int64, >= 0, ascending
+    time_s : (N,) float64, seconds from the clip's first frame, strictly increasing within a clip
+    duration_s : (N,) float64, seconds, length of the node's clip
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, the nodes are not sorted by clip and time, or a time lies outside its clip.
+    """
+
+    clip_index: Int
+    time_s: Float
+    duration_s: Float
+
+    def __post_init__(self) -> None:
+        n = len(self.clip_index)
+        for name in ("clip_index", "time_s", "duration_s"):
+            if getattr(self, name).shape != (n,):
+                raise ValueError(f"{name}: want ({n},), got {getattr(self, name).shape}")
+        step = np.diff(self.clip_index)
+        if n and (self.clip_index[0] < 0 or (step < 0).any() or (np.diff(self.time_s)[step == 0] <= 0).any()):
+            raise ValueError("clip_index, time_s: want nodes sorted by clip, then by time, no time twice; sort them")
+        if not ((self.time_s >= 0) & (self.time_s <= self.duration_s + 1e-6)).all():
+            raise ValueError("time_s: want 0 to the clip's duration; check the beats against the clip they came from")
+
+    def __len__(self) -> int:
+        return len(self.clip_index)
+
+    @property
+    def next_node(self) -> Int:
+        """The clip's next beat, (N,) int64; -1 at its last."""
+        n = len(self)
+        follows = np.append(np.diff(self.clip_index) == 0, np.zeros(min(n, 1), bool))
+        return np.where(follows, np.arange(1, n + 1), -1)
+
+    @property
+    def previous_node(self) -> Int:
+        """The clip's beat before, (N,) int64; -1 at its first."""
+        n = len(self)
+        follows = np.append(np.zeros(min(n, 1), bool), np.diff(self.clip_index) == 0)
+        return np.where(follows, np.arange(-1, n - 1), -1)
+
+    def may_leave(self, min_margin_s: float = 0.0) -> Mask:
+        """Nodes that a transition may start from, (N,): danced to, and with frames behind them for half a blend."""
+        return (self.previous_node >= 0) & (self.duration_s - self.time_s >= min_margin_s)
+
+    def may_enter(self, min_margin_s: float = 0.0) -> Mask:
+        """Nodes that a transition may arrive at, (N,): the clip goes on, and has frames before for half a blend."""
+        return (self.next_node >= 0) & (self.time_s >= min_margin_s)
+
+    def same_moment(self, guard_s: float) -> tuple[Int, Int]:
+        """Ranges [first, last) of nodes of each node's clip nearer in time than ``guard_s``, itself included."""
+        first, last = np.arange(len(self)), np.arange(1, len(self) + 1)
+        starts = np.flatnonzero(self.previous_node < 0)
+        for start, end in zip(starts, np.append(starts[1:], len(self)), strict=True):
+            time_s = self.time_s[start:end]
+            first[start:end] = np.minimum(start + np.searchsorted(time_s, time_s - guard_s, "right"), first[start:end])
+            last[start:end] = np.maximum(start + np.searchsorted(time_s, time_s + guard_s, "left"), last[start:end])
+        return first, last
+
+
+def beat_nodes(time_s: Sequence[Float], duration_s: Sequence[float]) -> BeatNodes:
+    """Line up the beats of all clips.
+
+    Parameters
+    ----------
+    time_s : one (B,) float array a clip, seconds from its first frame, strictly increasing
+    duration_s : one float a clip, seconds
+
+    Returns
+    -------
+    BeatNodes, clips numbered in the order given; a clip without beats has no node
+
+    Raises
+    ------
+    ValueError
+        If the two differ in length, or a clip's beats do not increase or leave the clip.
+    """
+    if len(time_s) != len(duration_s):
+        raise ValueError(f"duration_s: want one a clip, {len(time_s)}, got {len(duration_s)}")
+    counts = [len(beats) for beats in time_s]
+    return BeatNodes(
+        np.repeat(np.arange(len(counts)), counts),
+        np.concatenate([*time_s, np.zeros(0)]).astype(np.float64),
+        np.repeat(np.asarray(duration_s, np.float64), counts),
+    )

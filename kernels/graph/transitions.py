@@ -1,0 +1,329 @@
+"""Which beat may follow which: the nearest poses of all clips, and the ratio rule that joins them.
+
+Conventions
+-----------
+Two stages. :func:`nearest` finds, row by row, the k nearest nodes of each node; it alone looks at distances, a row
+never depends on another, and the answer is the same on every backend. :func:`connect` applies the threshold and makes
+the edges; it is cheap and looks at no pose.
+
+*Rule of the blend.* The blend of a transition i → j is centred on the beat: half of it needs frames of i's clip after
+i, half of it frames of j's clip before j. Both must be at least ``min_margin_s``. Only edges a dance can use are made:
+i must have a beat before it (it is danced to), j one after it (it is danced from).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.graph.distance import (
+    Metric,
+    PairDistance,
+    PoseFeatures,
+    error_bound,
+    paired_distance,
+    pose_distance,
+)
+from kernels.graph.features import BeatFeatures
+from kernels.graph.nodes import BeatNodes
+from kernels.graph.prune import has_endless_dance
+from kernels.types import Float, Int, MotionGraph
+
+Mask = NDArray[np.bool_]
+_Pairs = tuple[Int, Int, Float, Float]
+
+N_NEAREST = 20
+GUARD_S = 0.5
+MIN_MARGIN_S = 0.1
+THRESHOLD = 8.0
+RAISE = 1.25
+
+FLOOR: dict[Metric, float] = {"position": 0.01**2, "rotation": 0.03**2}
+"""Least d(i): a pose that moves by a centimetre, or by 0.03 rad, across the beat. Frozen poses count as this."""
+
+_TILE = 2**22
+_CHUNK = 2**13
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """The nearest nodes of each node, sorted by row, then weight, then other.
+
+    Parameters
+    ----------
+    row, other : (P,) int64, nodes
+    distance : (P,) float64, d(row, other), in the metric's unit squared
+    weight : (P,) float64, d(row, other) / (d(row) + d(other)): equation 20
+    min_margin_s : float, seconds
+        What the rows were made with: nearer pairs that only this margin forbids are listed beside the k nearest.
+    """
+
+    row: Int
+    other: Int
+    distance: Float
+    weight: Float
+    min_margin_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Transitions:
+    """The motion graph, and what it took.
+
+    Parameters
+    ----------
+    graph : MotionGraph
+    distance : (E,) float64, of each transition edge, in the metric's unit squared
+    threshold_asked, threshold_used : float
+        They differ where no dance could have gone on for ever with the threshold asked.
+    is_endless : bool, whether a dance can go on for ever
+    n_margin_removed : int, edges within the threshold that only the missing frames for a blend forbid
+    """
+
+    graph: MotionGraph
+    distance: Float
+    threshold_asked: float
+    threshold_used: float
+    is_endless: bool
+    n_margin_removed: int
+
+
+def find_transitions(
+    features: BeatFeatures,
+    nodes: BeatNodes,
+    *,
+    distance: PairDistance = pose_distance,
+    threshold: float = THRESHOLD,
+    n_nearest: int = N_NEAREST,
+    guard_s: float = GUARD_S,
+    min_margin_s: float = MIN_MARGIN_S,
+    floor: float | None = None,
+) -> Transitions:
+    """Make the motion graph of all beats: :func:`nearest`, then :func:`connect`; arguments and errors are theirs."""
+    pairs = nearest(
+        features, nodes, distance=distance, n_nearest=n_nearest, guard_s=guard_s, min_margin_s=min_margin_s, floor=floor
+    )
+    return connect(nodes, pairs, threshold=threshold)
+
+
+def nearest(
+    features: BeatFeatures,
+    nodes: BeatNodes,
+    *,
+    rows: Int | None = None,
+    distance: PairDistance = pose_distance,
+    n_nearest: int = N_NEAREST,
+    guard_s: float = GUARD_S,
+    min_margin_s: float = MIN_MARGIN_S,
+    floor: float | None = None,
+) -> Nearest:
+    """List the k nearest nodes of each node by equation 20, whatever their weight.
+
+    Parameters
+    ----------
+    features : BeatFeatures of N nodes
+    nodes : BeatNodes, N
+    rows : (R,) int64, the nodes to list for, or None for all
+    distance : PairDistance, :func:`kernels.graph.distance.pose_distance` or its twin on a device
+    n_nearest : int, k >= 1
+        Ties go to the lower node.
+    guard_s : float, seconds, >= 0
+        Nodes of the same clip nearer in time than this are the same moment, never a transition; nor is the next beat.
+    min_margin_s : float, seconds, >= 0
+        Frames a transition needs before and after it (module docstring).
+    floor : float, > 0, in the metric's unit squared, or None for :data:`FLOOR`
+        Least d(i): where the pose does not move across the beat, the ratio of equation 19 would divide by nothing.
+
+    Returns
+    -------
+    Nearest; empty when N is 0
+        A node that may be left lists the nodes it can go to; one that cannot, but may be entered, lists those that can
+        come to it. Time and memory: R·N distances in tiles of a few million, never the whole matrix.
+
+    Raises
+    ------
+    ValueError
+        If the lengths differ or an argument is out of range.
+
+    Notes
+    -----
+    A backend in float32 only proposes: every pair that :func:`kernels.graph.distance.error_bound` cannot rule out is
+    computed again by the reference, so that all backends list the same pairs with the same bits.
+    """
+    if len(features.pose) != len(nodes):
+        raise ValueError(f"features: want {len(nodes)} beats as nodes has, got {len(features.pose)}")
+    if n_nearest < 1:
+        raise ValueError(f"n_nearest: want >= 1, got {n_nearest}")
+    for name, value in (("guard_s", guard_s), ("min_margin_s", min_margin_s)):
+        if not (np.isfinite(value) and value >= 0):
+            raise ValueError(f"{name}: want finite, >= 0, got {value}")
+    floor = FLOOR[features.pose.metric] if floor is None else floor
+    if not (np.isfinite(floor) and floor > 0):
+        raise ValueError(f"floor: want finite, > 0, got {floor}")
+    rows = np.arange(len(nodes)) if rows is None else np.asarray(rows, np.int64)
+    search = _Search(
+        features, np.maximum(features.local_distance, floor), nodes, distance, n_nearest, guard_s, min_margin_s
+    )
+    parts = list(search.tiles(rows))
+    row, other, apart, weight = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    return Nearest(row.astype(np.int64), other.astype(np.int64), apart, weight, min_margin_s)
+
+
+def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float = THRESHOLD) -> Transitions:
+    """Join the listed pairs whose weight is below the threshold: equations 19 and 20 of JP5778523B2.
+
+    Parameters
+    ----------
+    nodes : BeatNodes, N
+    pairs : Nearest of these nodes
+    threshold : float, > 0, TH of equation 19
+
+    Returns
+    -------
+    Transitions; no edges when there are no pairs
+
+    Raises
+    ------
+    ValueError
+        If the threshold is not > 0.
+
+    Notes
+    -----
+    *Symmetric closure*: a pair is joined if either node lists the other, so a node may have more than k edges, none
+    fewer than the threshold leaves of its k. It is joined in both directions, save one that the rule of the blend
+    forbids or that leads to the clip's next beat, which is no transition.
+
+    When with the threshold asked no dance can go on for ever (no cycle), it is raised by steps of a quarter until one
+    can. Where all pairs together make none, the threshold asked is kept.
+    """
+    if not (np.isfinite(threshold) and threshold > 0):
+        raise ValueError(f"threshold: want finite, > 0, got {threshold}")
+    used = threshold
+    graph, apart, n_removed = _join(nodes, pairs, used)
+    endless = has_endless_dance(graph)
+    largest = float(pairs.weight.max(initial=0.0))
+    while not endless and used <= largest:
+        used = used * RAISE
+        graph, apart, n_removed = _join(nodes, pairs, used)
+        endless = has_endless_dance(graph)
+    if not endless:
+        used = threshold
+        graph, apart, n_removed = _join(nodes, pairs, used)
+    return Transitions(graph, apart, threshold, used, endless, n_removed)
+
+
+def _join(nodes: BeatNodes, pairs: Nearest, threshold: float) -> tuple[MotionGraph, Float, int]:
+    """Edges of the pairs below a threshold, their distances, and how many the margin forbids."""
+    n = max(len(nodes), 1)
+    near = pairs.weight < threshold
+    row, other = pairs.row[near], pairs.other[near]
+    source, target = np.concatenate([row, other]), np.concatenate([other, row])
+    _, first = np.unique(source * n + target, return_index=True)
+    source, target = source[first], target[first]
+    apart, weight = np.tile(pairs.distance[near], 2)[first], np.tile(pairs.weight[near], 2)[first]
+    useful = nodes.may_leave()[source] & nodes.may_enter()[target] & (nodes.next_node[source] != target)
+    allowed = nodes.may_leave(pairs.min_margin_s)[source] & nodes.may_enter(pairs.min_margin_s)[target]
+    edge = np.flatnonzero(useful & allowed)
+    edge = edge[np.lexsort((target[edge], weight[edge], source[edge]))]
+    graph = MotionGraph(nodes.clip_index, nodes.time_s, nodes.next_node, source[edge], target[edge], weight[edge])
+    return graph, apart[edge], int((useful & ~allowed).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The rows of :func:`nearest`, tile by tile."""
+
+    features: BeatFeatures
+    local: Float
+    nodes: BeatNodes
+    distance: PairDistance
+    n_nearest: int
+    guard_s: float
+    min_margin_s: float
+
+    def tiles(self, rows: Int) -> Iterator[_Pairs]:
+        """Yield the listed pairs, a tile of rows at a time; first an empty one, so that there is always one."""
+        nothing = np.zeros(0, np.int64)
+        yield nothing, nothing, np.zeros(0), np.zeros(0)
+        nodes, margin = self.nodes, self.min_margin_s
+        leaves, enters = nodes.may_leave(margin), nodes.may_enter(margin)
+        first, last = nodes.same_moment(self.guard_s)
+        for group, useful, allowed, step in (
+            (rows[leaves[rows]], nodes.may_enter(), enters, nodes.next_node),
+            (rows[~leaves[rows] & enters[rows]], nodes.may_leave(), leaves, nodes.previous_node),
+        ):
+            column = np.flatnonzero(useful)
+            poses = self.features.pose.take(column)
+            size = max(_TILE // max(len(column), 1), 1)
+            for start in range(0, len(group) if len(column) else 0, size):
+                row = group[start : start + size]
+                excluded = np.stack([first[row], last[row], step[row], step[row] + 1], axis=1)
+                yield self._tile(row, column, poses, allowed[column], np.searchsorted(column, excluded))
+
+    def _tile(self, row: Int, column: Int, poses: PoseFeatures, allowed: Mask, excluded: Int) -> _Pairs:
+        """List the pairs of some rows; per row, ``excluded`` has two ranges of columns that are no transition."""
+        apart = self.distance(self.features.pose.take(row), poses)
+        weight = apart / np.add.outer(self.local[row], self.local[column]).astype(apart.dtype)
+        _exclude(weight, excluded)
+        cut = self._cut(weight[:, allowed], self.local[row])
+        r, c = np.nonzero((weight <= cut[:, None]) & np.isfinite(weight))
+        if apart.dtype == np.float64:
+            distance = apart[r, c].astype(np.float64)
+        else:
+            crowded = np.bincount(r, minlength=len(row)) > 4 * self.n_nearest + 256
+            calm = ~crowded[r]
+            r, c = r[calm], c[calm]
+            distance = self._paired(row[r], column[c])
+            for i in np.flatnonzero(crowded):  # poses frozen alike by the hundred: whole rows by the reference
+                exact = pose_distance(self.features.pose.take(row[i : i + 1]), poses)
+                ratio = exact / (self.local[row[i]] + self.local[column])
+                _exclude(ratio, excluded[i : i + 1])
+                order = np.argsort(ratio[0], kind="stable")
+                order = order[np.isfinite(ratio[0, order])]
+                order = order[np.cumsum(allowed[order]) - allowed[order] < self.n_nearest]
+                r, c = np.append(r, np.full(len(order), i)), np.append(c, order)
+                distance = np.append(distance, exact[0, order])
+        ratio = distance / (self.local[row[r]] + self.local[column[c]])
+        order = np.lexsort((c, ratio, r))
+        r, c, distance, ratio = r[order], c[order], distance[order], ratio[order]
+        listed = _rank(r, np.ones(len(r), bool)) < self.n_nearest
+        listed |= (_rank(r, allowed[c]) < self.n_nearest) & allowed[c]
+        return row[r[listed]], column[c[listed]], distance[listed], ratio[listed]
+
+    def _cut(self, weight: NDArray[np.floating], local: Float) -> Float:
+        """Weight up to which a pair may be among the k nearest of its row, given the backend's error."""
+        k = self.n_nearest
+        if weight.shape[1] < k:
+            return np.full(len(weight), np.inf)
+        kth = np.partition(weight, k - 1, axis=1)[:, k - 1].astype(np.float64)
+        relative, absolute = error_bound(self.features.pose, weight.dtype)
+        if weight.dtype == np.float64:
+            return kth
+        relative = relative + 2.0**-22  # the sum and the division of the ratio
+        slack = absolute / np.sqrt(local + self.local.min())
+        return np.asarray((((np.sqrt(kth) + slack) * (1 + relative) / (1 - relative)) + slack) ** 2, np.float64)
+
+    def _paired(self, first: Int, second: Int) -> Float:
+        """Compute distances of pairs of nodes by the reference."""
+        pose = self.features.pose
+        distance = np.zeros(len(first))
+        for start in range(0, len(first), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            distance[part] = paired_distance(pose.take(first[part]), pose.take(second[part]))
+        return distance
+
+
+def _exclude(weight: NDArray[np.floating], excluded: Int) -> None:
+    """Set two ranges of columns of each row to infinity."""
+    for r, (a, b, c, d) in enumerate(excluded.tolist()):
+        weight[r, a:b] = np.inf
+        weight[r, c:d] = np.inf
+
+
+def _rank(group: Int, counted: Mask) -> Int:
+    """How many counted come before each entry in its group; groups are contiguous."""
+    before: Int = np.cumsum(counted) - counted
+    start = np.searchsorted(group, group, "left")
+    return before - before[start]
