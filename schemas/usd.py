@@ -15,6 +15,9 @@ MESH_PATH = "/Dance/Body"
 LOOKS_PATH = "/Dance/Looks"
 AUDIO_PATH = "/Dance/Song"
 
+# Materials and mesh subsets: the dancer's own sides.
+SIDES: tuple[str, ...] = ("middle", "left", "right")
+
 UP_AXIS = "Y"
 METERS_PER_UNIT = 1.0
 START_TIME_CODE = 0.0

@@ -20,8 +20,6 @@ from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.kinematics import rest_position
 from kernels.types import Float, Int, Skeleton
 
-SIDES: tuple[str, ...] = ("middle", "left", "right")
-
 # Joint, without its side: the joint its part reaches to, half widths in metres at both ends, depth over width.
 _LIMBS: dict[str, tuple[str, float, float, float]] = {
     "hips": ("spine", 0.160, 0.125, 0.70),
@@ -52,7 +50,7 @@ class Body:
     normal_xyz : (V, 3) float64, unit
     triangle : (T, 3) int64, vertex indices, counter-clockwise seen from outside
     joint_index : (V,) int64, index into the skeleton's joints
-    side_index : (T,) int64, index into :data:`SIDES`
+    side_index : (T,) int64, index into :data:`schemas.usd.SIDES`
     """
 
     point_xyz_m: Float
@@ -111,7 +109,7 @@ def _scale(skeleton: Skeleton) -> float:
 
 
 def _side(joint: str, rest_xyz_m: Float, scale: float) -> int:
-    """Index into SIDES by the name, else by the place at rest."""
+    """Tell the side by the name, else by the place at rest; an index into SIDES."""
     name = joint.lower()
     if "left" in name or "right" in name:
         return 1 if "left" in name else 2

@@ -13,18 +13,21 @@ import json
 import os
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdMedia, UsdShade, UsdSkel, Vt
 
 from assets.formats import usd_read
-from assets.formats.mesh import SIDES, Body, body
 from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.types import Clip, Float, Skeleton
 from schemas import usd as contract
+
+if TYPE_CHECKING:
+    from assets.formats.mesh import Body
 
 # Linear colours one can tell apart with any eyes: left vermilion, right blue.
 SIDE_RGB: dict[str, tuple[float, float, float]] = {
@@ -68,6 +71,9 @@ def write_stage(
         raise ValueError(f"path: want a name ending in .usdc, got {path.name!r}")
     if clip.n_frames < 1:
         raise ValueError("clip: want at least one frame, got none")
+    # trimesh brings SciPy and a second of loading, which reading and checking can do without.
+    from assets.formats.mesh import body
+
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
     _write_metadata(stage, clip)
@@ -80,7 +86,8 @@ def write_stage(
         _write_audio(stage, audio)
     with Sdf.ChangeBlock():
         write_animation(layer, clip)
-    export(layer, path)
+    with written_beside(path) as partial:
+        save(layer, partial)
 
 
 def joint_paths(skeleton: Skeleton) -> list[str]:
@@ -206,11 +213,11 @@ def _write_body(stage: Usd.Stage, shape: Body) -> None:
 
     side_of_point = np.zeros(len(point), np.int64)
     side_of_point[shape.triangle] = shape.side_index[:, None]
-    color = np.array([SIDE_RGB[side] for side in SIDES], np.float32)[side_of_point]
+    color = np.array([SIDE_RGB[side] for side in contract.SIDES], np.float32)[side_of_point]
     mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex).Set(Vt.Vec3fArray.FromNumpy(color))
     UsdGeom.Scope.Define(stage, contract.LOOKS_PATH)
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).SetMaterialBindSubsetsFamilyType(UsdGeom.Tokens.partition)
-    for index, side in enumerate(SIDES):
+    for index, side in enumerate(contract.SIDES):
         faces = np.flatnonzero(shape.side_index == index)
         if len(faces) == 0:
             continue
@@ -244,7 +251,7 @@ def _write_extent(stage: Usd.Stage, clip: Clip, shape: Body) -> None:
 def _write_audio(stage: Usd.Stage, audio: str) -> None:
     """Define the song. It starts with the stage: no startTime, since one importer refuses it."""
     relative = PurePosixPath(audio)
-    if is_absolute(audio) or relative.suffix.lower() != contract.PACKAGE_AUDIO_SUFFIX:
+    if usd_read.is_absolute(audio) or relative.suffix.lower() != contract.PACKAGE_AUDIO_SUFFIX:
         raise ValueError(f"audio: want a relative path of a WAV file, got {audio!r}")
     song = UsdMedia.SpatialAudio.Define(stage, contract.AUDIO_PATH)
     song.CreateFilePathAttr(Sdf.AssetPath(f"./{relative}"))
@@ -252,16 +259,11 @@ def _write_audio(stage: Usd.Stage, audio: str) -> None:
     song.CreatePlaybackModeAttr(UsdMedia.Tokens.onceFromStart)
 
 
-def is_absolute(text: str) -> bool:
-    """Whether a text names a place on one machine."""
-    return bool(re.match(r"(/|~|\\\\|[A-Za-z]:[\\/]|file:)", text))
-
-
 def _to_usd(value: object, name: str) -> object:
     """Turn what JSON can hold into what customData can hold."""
     if isinstance(value, Mapping):
         return {str(key): _to_usd(value[key], f"{name}.{key}") for key in sorted(value)}
-    if isinstance(value, str) and is_absolute(value):
+    if isinstance(value, str) and usd_read.is_absolute(value):
         raise ValueError(f"{name}: want nothing that names one machine, got {value!r}; give a path inside the studio")
     if isinstance(value, str | bool | int | float):
         return value
@@ -282,25 +284,39 @@ def _to_usd(value: object, name: str) -> object:
 
 @contextmanager
 def written_beside(path: Path) -> Iterator[Path]:
-    """Give a place to write, renamed to ``path`` at the end and removed where that fails."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+    """Give a place to write, renamed to ``path`` at the end and removed where that fails.
+
+    Raises
+    ------
+    OSError
+        One sentence with the reason; what stood at ``path`` before still stands.
+    """
     partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         yield partial
         partial.replace(path)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise OSError(f"{path}: want a place to write, got: {reason}; what stood there before still does") from error
+        raise OSError(
+            f"{path}: want a place to write, got: {error.strerror or error}; nothing was changed there"
+        ) from error
     finally:
-        partial.unlink(missing_ok=True)
+        # Where even the folder is none, there is nothing to remove.
+        with suppress(OSError):
+            partial.unlink()
 
 
-def export(layer: Sdf.Layer, path: Path) -> None:
-    """Write a layer, whole or not at all."""
-    with written_beside(path) as partial:
-        try:
-            is_written = layer.Export(str(partial))
-        except Tf.ErrorException as error:
-            raise OSError(usd_read.reason(error)) from error
-        if not is_written:
-            raise OSError("USD wrote nothing")
+def save(layer: Sdf.Layer, path: Path) -> None:
+    """Write a layer in the format of the suffix.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written whole.
+    """
+    try:
+        is_written = layer.Export(str(path))
+    except Tf.ErrorException as error:
+        raise OSError(usd_read.reason(error)) from error
+    if not is_written:
+        raise OSError("USD wrote nothing")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,11 @@ def animated_skeleton(stage: Usd.Stage) -> UsdSkel.SkeletonQuery | None:
             if query and query.GetAnimQuery():
                 return query
     return None
+
+
+def is_absolute(text: str) -> bool:
+    """Whether a text names a place on one machine."""
+    return bool(re.match(r"(/|~|\\\\|[A-Za-z]:[\\/]|file:)", text))
 
 
 def _read_skeleton(query: UsdSkel.SkeletonQuery, metres: float) -> Skeleton:
