@@ -51,7 +51,7 @@ def write_package(path: str | Path, stage: str | Path) -> None:
     with usd.written_beside(path) as partial:
         scratch = partial.with_suffix(".usdc")
         try:
-            usd.export(layer, scratch)
+            usd.save(layer, scratch)
             members.insert(0, ("dance.usdc", scratch.read_bytes()))
         finally:
             scratch.unlink(missing_ok=True)
