@@ -9,15 +9,21 @@ Y up, quaternions. Position channels replace OFFSET on every joint but the root,
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from assets.formats.bvh_header import parse_header
 from assets.formats.bvh_values import parse_values
 from assets.formats.errors import FormatError
-from kernels.types import Float, Int
+from kernels import rotation
+from kernels.skeleton import axes, kinematics, naming
+from kernels.types import Clip, Float, Int, Skeleton
 
 MAX_BYTES = 1 << 30
+_MANY_FRAMES = 64
 _COMMON_HZ = (24, 25, 30, 48, 50, 60, 72, 90, 100, 120, 144, 150, 180, 200, 240)
 _LONGEST_FRAME_S = 2.0
 _SHORTEST_FRAME_S = 1e-4
@@ -178,3 +184,119 @@ def frame_rate_hz(frame_time_text: str) -> float:
     if rounded and n_digits < 8:
         return float(min(rounded, key=lambda common: abs(common - rate)))
     return rate
+
+
+@dataclass(frozen=True, eq=False)
+class Take:
+    """A clip in our world, and what its file was taken to mean.
+
+    Parameters
+    ----------
+    clip : Clip
+        On the file's own rig, in metres, Y up. End Sites of some length are joints, named ``<joint>_end``.
+    world : axes.World
+        Unit, up axis and root rule inferred.
+    mapping : naming.JointMapping or None
+        None where the rig is not known to be a body.
+    """
+
+    clip: Clip
+    world: axes.World
+    mapping: naming.JointMapping | None
+
+
+def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> Take:
+    """Bring a file to metres, Y up and quaternions.
+
+    Position channels stand in place of OFFSET, axis by axis; the root's may add to it, which is decided by what puts
+    the feet on the floor. Unit and up axis are inferred from the body.
+
+    Parameters
+    ----------
+    bvh : Bvh
+    extra : rig's name to canonical name, or None
+        The user's own table of joints.
+
+    Returns
+    -------
+    Take
+        The clip's ``translation_xyz_m`` is None unless channels move a joint off its OFFSET by more than 1/10,000 of
+        the body's height.
+
+    Raises
+    ------
+    ValueError
+        If scale channels are not all 1, or the user's table names what is no canonical joint.
+    """
+    skeleton = _skeleton_in_units(bvh)
+    root, local, translation = _poses_in_units(bvh, skeleton)
+    some = np.unique(np.linspace(0, len(root) - 1, _MANY_FRAMES).astype(np.int64))
+    moved = None if translation is None else translation[some]
+    position, _ = kinematics.forward(skeleton, root[some], local[some], translation_xyz_m=moved)
+    try:
+        mapping = naming.map_joints(skeleton, extra)
+    except naming.NoBodyError:
+        mapping = None
+    world = axes.infer_world(skeleton, mapping.joint if mapping is not None else None, position)
+    if world.root_offset_rule == "add":
+        root = root + skeleton.offset_xyz_m[0] * _has_channel(bvh, 0)
+    scale = world.metres_per_unit
+    offset_m = axes.vectors_to_y_up(skeleton.offset_xyz_m, world.up_axis) * scale
+    translation_m = None
+    if translation is not None:
+        translation_m = axes.vectors_to_y_up(translation, world.up_axis) * scale
+        tallest = scale * axes.stature(skeleton, mapping.joint) if mapping is not None else 1.7
+        if not (np.abs(translation_m[:, 1:] - offset_m[1:]) > 1e-4 * tallest).any():
+            translation_m = None
+    clip = Clip(
+        skeleton=Skeleton(skeleton.joints, skeleton.parent, offset_m),
+        frame_rate_hz=bvh.frame_rate_hz,
+        root_xyz_m=axes.vectors_to_y_up(root, world.up_axis) * scale,
+        rotation_wxyz=rotation.continuous(axes.rotations_to_y_up(local, world.up_axis)),
+        translation_xyz_m=translation_m,
+    )
+    return Take(clip, world, mapping)
+
+
+def _skeleton_in_units(bvh: Bvh) -> Skeleton:
+    """Joints and End Sites of some length, in file units and axes."""
+    names, parent, offset = list(bvh.joints), list(bvh.parent), list(bvh.offset)
+    for joint, end in zip(bvh.end_joint, bvh.end_offset, strict=True):
+        name = bvh.joints[joint] + naming.END_SUFFIX
+        if np.any(end != 0) and name not in names:
+            names.append(name)
+            parent.append(joint)
+            offset.append(end)
+    return Skeleton(tuple(names), np.array(parent, np.int64), np.array(offset, np.float64))
+
+
+def _has_channel(bvh: Bvh, joint: int) -> Float:
+    """1 for each axis along which the joint has a position channel, else 0; (3,)."""
+    return np.array([float(axis + "position" in bvh.channels[joint]) for axis in "XYZ"])
+
+
+def _poses_in_units(bvh: Bvh, skeleton: Skeleton) -> tuple[Float, Float, Float | None]:
+    """Root positions (F, 3), local rotations (F, J, 4) and local positions (F, J, 3) or None, channels replacing."""
+    f, j = len(bvh.values), len(skeleton.joints)
+    column = np.cumsum([0, *(len(channels) for channels in bvh.channels)])
+    local = np.tile(rotation.IDENTITY, (f, j, 1))
+    translation = np.tile(skeleton.offset_xyz_m, (f, 1, 1))
+    by_order: dict[str, list[int]] = {}
+    has_moved = False
+    for joint, channels in enumerate(bvh.channels):
+        order = "".join(name[0].lower() for name in channels if name.endswith("rotation"))
+        by_order.setdefault(order, []).append(joint)
+        for k, name in enumerate(channels):
+            value = bvh.values[:, column[joint] + k]
+            if name.endswith("position"):
+                translation[:, joint, "XYZ".index(name[0])] = value
+                has_moved = has_moved or joint > 0
+            elif name.endswith("scale") and not np.allclose(value, 1.0, atol=1e-3):
+                raise ValueError(
+                    f"{name} of {bvh.joints[joint]!r}: want 1, got {value.min()} to {value.max()}; bake it"
+                )
+    for order, joints in by_order.items():
+        turns = [[k for k, name in enumerate(bvh.channels[joint]) if name.endswith("rotation")] for joint in joints]
+        columns = column[joints][:, None] + np.array(turns, np.int64).reshape(len(joints), len(order))
+        local[:, joints] = rotation.from_euler(np.radians(bvh.values[:, columns]), order)
+    return translation[:, 0].copy(), local, translation if has_moved else None

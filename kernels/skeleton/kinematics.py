@@ -80,3 +80,24 @@ def rest_position(skeleton: Skeleton) -> Float:
     for k in range(1, len(skeleton.joints)):
         position[k] += position[skeleton.parent[k]]
     return position
+
+
+def hang(skeleton: Skeleton, root_xyz_m: Float, orientation_wxyz: Float) -> Float:
+    """Place every joint from world orientations: what :func:`forward` does from local ones.
+
+    Parameters
+    ----------
+    skeleton : Skeleton of J joints
+    root_xyz_m : (F, 3) float, metres
+    orientation_wxyz : (F, J, 4) float, unit, world
+
+    Returns
+    -------
+    (F, J, 3) float64, metres, world
+    """
+    bone = rotation.apply(orientation_wxyz[:, skeleton.parent[1:]], skeleton.offset_xyz_m[1:])
+    position = np.zeros((*orientation_wxyz.shape[:2], 3))
+    position[:, 0] = root_xyz_m
+    for k in range(1, len(skeleton.joints)):
+        position[:, k] = position[:, skeleton.parent[k]] + bone[:, k - 1]
+    return position

@@ -1,0 +1,319 @@
+"""How a rig's joints stand when its body stands in the canonical rest pose.
+
+Conventions
+-----------
+The *neutral orientation* N of a joint is its world orientation while the body stands upright in a T-pose facing +Z.
+A joint turned to G in the world turns its canonical joint to G N⁻¹. Bone directions fix all of N but a twist; the twist
+comes from the rest pose where that is a human pose, else from how elbows and knees bend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from kernels import rotation
+from kernels.skeleton import canonical, kinematics, topology
+from kernels.types import Clip, Float
+
+X, Y, Z = np.eye(3)
+SIDES = ("left", "right")
+# Bone of each canonical joint: the child its direction points to.
+BONE: dict[str, str] = {"neck": "head"} | {
+    side + a: side + b for side in SIDES for limb in (topology.ARM, topology.LEG) for a, b in pairwise(limb)
+}
+
+
+_HINGE: dict[tuple[str, ...], tuple[str, str, str]] = {
+    topology.ARM: ("UpperArm", "LowerArm", "Hand"),
+    topology.LEG: ("UpperLeg", "LowerLeg", "Foot"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """A clip on its rig, placed in the world, with what is known of its body.
+
+    Parameters
+    ----------
+    clip : Clip
+    at : canonical name to joint index, with the required joints
+    spine : joints above the hips up to the one that carries the arms
+    neck : joints above that one up to and with the head
+    rest : (J, 3) float, metres
+        World positions at rest, with the usual local positions where the rig moves its joints.
+    position : (F, J, 3) float, metres, world
+    orientation : (F, J, 4) float, world
+    planted_pitch_rad : float or None
+        Elevation of the direction from ankle to toes in planted feet; None where unknown.
+    """
+
+    clip: Clip
+    at: Mapping[str, int]
+    spine: list[int]
+    neck: list[int]
+    rest: Float
+    position: Float
+    orientation: Float
+    planted_pitch_rad: float | None = None
+
+
+def bone_direction(joint: str) -> Float:
+    """Give the unit direction of a canonical joint's bone at rest, (3,)."""
+    return unit(canonical.CANONICAL.offset_xyz_m[canonical.JOINTS.index(BONE[joint])])
+
+
+def foot_direction(pitch_rad: float) -> Float:
+    """Give the unit direction of a foot that points ahead at an elevation, (3,)."""
+    return np.array([0.0, np.sin(pitch_rad), np.cos(pitch_rad)])
+
+
+def unit(vector: Float) -> Float:
+    """Vectors (..., 3) at length one; zero stays zero."""
+    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12), np.float64)
+
+
+def turn(source: tuple[Float, Float], target: tuple[Float, Float]) -> Float:
+    """Rotation (..., 4) that takes a primary and a secondary direction to another pair; exact for the primary."""
+    return rotation.from_matrix(_square(*target) @ np.swapaxes(_square(*source), -1, -2))
+
+
+def rest_position(clip: Clip) -> Float:
+    """World positions (J, 3) at rest, with the median local position where the rig moves its joints."""
+    position = kinematics.rest_position(clip.skeleton)
+    if clip.translation_xyz_m is None or clip.n_frames == 0:
+        return position
+    local = np.median(clip.translation_xyz_m, axis=0)
+    for k in range(1, len(position)):
+        position[k] = position[clip.skeleton.parent[k]] + local[k]
+    return position
+
+
+def neutral_orientations(rig: Rig) -> dict[int, Float]:
+    """Find the neutral orientation of each joint that drives the body.
+
+    Parameters
+    ----------
+    rig : Rig
+        Of at least one frame.
+
+    Returns
+    -------
+    dict
+        Joint index to (4,) float64, for the joints in ``rig.at`` and all of the spine and neck.
+
+    Notes
+    -----
+    From a human rest pose: each bone is swung, by the shortest arc and parents first, to where it is in the canonical
+    pose. A rest pose that is no human pose (bones of a rig built along their own axes, so that legs point up and arms
+    cross) says nothing about twist: there the axis about which the elbow or knee bends, seen from the joint and
+    averaged over the clip, is brought to the canonical one, and joints without such an axis are untwisted on average.
+    """
+    body = _body_turn(rig)
+    return _from_motion(rig) if body is None else _from_rest(rig, body)
+
+
+def _square(primary: Float, secondary: Float) -> Float:
+    """Right-handed axes (..., 3, 3) in columns: ``primary``, ``secondary`` made square to it, and their cross."""
+    a = unit(primary)
+    b = unit(secondary - a * np.sum(a * secondary, axis=-1, keepdims=True))
+    return np.stack([a, b, np.cross(a, b)], axis=-1)
+
+
+def _snap(vector: Float, limit: float = 0.9) -> Float:
+    """Give the unit vector, or the coordinate axis near it (within 25 degrees): rigs are built along axes."""
+    vector = unit(vector)
+    k = int(np.argmax(np.abs(vector)))
+    return np.sign(vector[k]) * np.eye(3)[k] if abs(vector[k]) > limit else vector
+
+
+def _body_turn(rig: Rig) -> Float | None:
+    """Turn (4,) that stands the rest pose upright facing +Z; None where the rest pose is no human pose."""
+    at, rest = rig.at, rig.rest
+    left = _snap(rest[at["leftUpperLeg"]] - rest[at["rightUpperLeg"]])
+    up = _snap(rest[rig.neck[0]] - (rest[at["leftUpperLeg"]] + rest[at["rightUpperLeg"]]) / 2)
+    if np.linalg.norm(np.cross(left, up)) < 0.5:
+        return None
+    body = turn((left, up), (X, Y))
+
+    def along(a: str, b: str) -> Float:
+        return rotation.apply(body, unit(rest[at[b]] - rest[at[a]]))
+
+    is_human = along("rightUpperArm", "leftUpperArm") @ X > 0.3
+    for side in SIDES:
+        thigh, shin = along(side + "UpperLeg", side + "LowerLeg"), along(side + "LowerLeg", side + "Foot")
+        arm, forearm = along(side + "UpperArm", side + "LowerArm"), along(side + "LowerArm", side + "Hand")
+        is_human &= thigh @ -Y > -0.2 and thigh @ shin > -0.5 and arm @ forearm > -0.5
+        if side + "Toes" in at:
+            foot = along(side + "Foot", side + "Toes")
+            is_human &= foot @ shin < 0.98 and foot @ Z > -0.5
+    return body if is_human else None
+
+
+def _from_rest(rig: Rig, body: Float) -> dict[int, Float]:
+    """Neutral orientations from a human rest pose: all orientations there are the identity, so the swing is neutral."""
+    at, rest = rig.at, rig.rest
+    neutral: dict[int, Float] = {at["hips"]: body}
+
+    def swing(turned: Float, a: int, b: int, target: Float) -> Float:
+        bone = rest[b] - rest[a]
+        return _swing(rotation.apply(turned, bone), target, turned) if np.linalg.norm(bone) > 1e-9 else turned
+
+    chest = body
+    for a, b in zip(rig.spine, [*rig.spine[1:], rig.neck[0]], strict=True):
+        chest = neutral[a] = swing(chest, a, b, Y)
+    here = chest
+    for a, b in zip(rig.neck, [*rig.neck[1:], rig.neck[-1]], strict=True):
+        here = neutral[a] = swing(here, a, b, Y)
+    for side in SIDES:
+        for limb, start in ((topology.ARM, chest), (topology.LEG, body)):
+            here = start
+            chain = [side + part for part in limb if side + part in at]
+            for name, child in zip(chain, [*chain[1:], None], strict=True):
+                if name.endswith("Foot") and child is not None:
+                    here = _flat_foot(rig, here, body, rest[at[child]] - rest[at[name]])
+                elif child is not None:
+                    here = swing(here, at[name], at[child], bone_direction(name))
+                neutral[at[name]] = here
+    return neutral
+
+
+def _swing(direction: Float, target: Float, turned: Float) -> Float:
+    return rotation.mul(rotation.between(direction, target), turned)
+
+
+def _flat_foot(rig: Rig, shin: Float, body: Float, bone: Float) -> Float:
+    """Neutral orientation of a foot from its rest pose: pointing ahead, at the elevation that lies flat.
+
+    The elevation at rest is that of another foot's anatomy, to be kept, or of a rest pose with stretched feet, to be
+    undone: whichever planted feet show.
+    """
+    if np.linalg.norm(bone) < 1e-9:
+        return shin
+    by_shin, by_body = (unit(rotation.apply(turned, bone)) for turned in (shin, body))
+    # Feet flat on the floor under spread legs follow the body, feet spread with the legs follow the shin.
+    is_by_body = abs(by_body[0]) < abs(by_shin[0]) - 0.02 and rotation.angle_between(shin, body) < 0.6
+    turned, direction = (body, by_body) if is_by_body else (shin, by_shin)
+    pitch = float(np.arcsin(np.clip(direction[1], -1, 1)))
+    if rig.planted_pitch_rad is not None:
+        pitch = min(pitch, FLAT_PITCH_RAD, key=lambda flat: abs(flat - float(rig.planted_pitch_rad or 0.0)))
+    elif not -0.9 < pitch < 0.1:
+        pitch = FLAT_PITCH_RAD
+    return _swing(direction, foot_direction(pitch), turned)
+
+
+def _from_motion(rig: Rig) -> dict[int, Float]:
+    """Neutral orientations where the rest pose is no human pose."""
+    at, P, G = rig.at, rig.position, rig.orientation
+    neutral: dict[int, Float] = {}
+    turned: dict[int, Float] = {}
+    hip_line = unit(P[:, at["leftUpperLeg"]] - P[:, at["rightUpperLeg"]])
+    arm_line = unit(P[:, at["leftUpperArm"]] - P[:, at["rightUpperArm"]])
+    is_square = _is_square(rig)
+
+    def local(k: int, world: Float) -> Float:
+        return np.asarray(np.mean(rotation.apply(rotation.inv(G[:, k]), world), axis=0), np.float64)
+
+    def settle(k: int, bone: Float, secondary: Float, target: tuple[Float, Float]) -> None:
+        primary = _snap(local(k, bone), 0.998)
+        second = local(k, secondary)
+        if is_square and np.abs(primary).max() > 0.998:
+            second = _snap(second - primary * (primary @ second), 0.7)
+        neutral[k] = turn((primary, second), target)
+        turned[k] = rotation.mul(G[:, k], rotation.inv(neutral[k]))
+
+    def follow(k: int, parent: int) -> None:
+        relative = _mean(rotation.mul(rotation.inv(turned[parent]), G[:, k]))
+        if is_square:
+            relative = _square_up(relative)
+        neutral[k] = relative
+        turned[k] = rotation.mul(G[:, k], rotation.inv(neutral[k]))
+
+    def carry(parent: int, bone: Float, direction: Float, secondary: Float) -> Float:
+        here = turned[parent]
+        swung = rotation.mul(rotation.between(rotation.apply(here, direction), bone), here)
+        return rotation.apply(swung, secondary)
+
+    hips = at["hips"]
+    trunk = P[:, rig.neck[0]] - P[:, hips]
+    first = next((k for k in rig.spine if np.linalg.norm(rig.rest[k] - rig.rest[hips]) > 1e-6), rig.neck[0])
+    settle(hips, hip_line, P[:, first] - P[:, hips], (X, Y))
+    last = hips
+    for i, (a, b) in enumerate(zip(rig.spine, [*rig.spine[1:], rig.neck[0]], strict=True), 1):
+        bone = P[:, b] - P[:, a]
+        if np.linalg.norm(rig.rest[b] - rig.rest[a]) < 1e-6:
+            bone = trunk
+        share = i / len(rig.spine)
+        settle(a, bone, unit((1 - share) * hip_line + share * arm_line), (Y, X))
+        last = a
+    chest = last
+    for a, b in pairwise(rig.neck):
+        settle(a, P[:, b] - P[:, a], arm_line, (Y, X))
+        last = a
+    follow(rig.neck[-1], last)
+    for side in SIDES:
+        for limb, start in ((topology.ARM, chest), (topology.LEG, hips)):
+            last = start
+            chain = [side + part for part in limb if side + part in at]
+            for name, child in zip(chain, [*chain[1:], None], strict=True):
+                k = at[name]
+                if child is None:
+                    follow(k, last)
+                    continue
+                bone = P[:, at[child]] - P[:, k]
+                direction, axis = bone_direction(name), Y if name.endswith("Shoulder") else X
+                if name.endswith("Foot"):
+                    direction = foot_direction(
+                        FLAT_PITCH_RAD if rig.planted_pitch_rad is None else rig.planted_pitch_rad
+                    )
+                if name.endswith("Arm"):
+                    axis = -Y if side == "left" else Y
+                bend = _bend(rig, side, limb) if name.endswith(("Arm", "Leg")) else None
+                settle(k, bone, carry(last, bone, direction, axis) if bend is None else bend, (direction, axis))
+                last = k
+    return neutral
+
+
+def _bend(rig: Rig, side: str, limb: tuple[str, ...]) -> Float | None:
+    """Axes (F, 3) about which elbow or knee bends, as long as the sine of the bend; None where it hardly does."""
+    a, b, c = (rig.position[:, rig.at[side + part]] for part in _HINGE[limb])
+    axis = np.cross(unit(b - a), unit(c - b))
+    return axis if np.sqrt(np.mean(np.sum(axis**2, axis=-1))) > np.sin(np.radians(5.0)) else None
+
+
+def _is_square(rig: Rig) -> bool:
+    """Whether elbows and knees bend about coordinate axes of the joints above them."""
+    for side in SIDES:
+        for limb in (topology.ARM, topology.LEG):
+            bend = _bend(rig, side, limb)
+            if bend is not None:
+                upper = rig.orientation[:, rig.at[side + _HINGE[limb][0]]]
+                axis = unit(np.mean(rotation.apply(rotation.inv(upper), bend), axis=0))
+                if np.abs(axis).max() < np.cos(np.radians(10.0)):
+                    return False
+    return True
+
+
+def _mean(q: Float) -> Float:
+    """Mean rotation (4,) of (F, 4): the largest eigenvector of the sum of outer products (Markley et al. 2007)."""
+    return np.asarray(np.linalg.eigh(q.T @ q)[1][:, -1], np.float64)
+
+
+def _square_up(q: Float) -> Float:
+    """Nearest rotation by quarter turns, where it is within 40 degrees; else ``q`` itself."""
+    m = rotation.to_matrix(q)
+    square = np.zeros((3, 3))
+    for column in np.argsort(-np.abs(m).max(axis=0)):
+        free = np.abs(m[:, column]) * (np.abs(square).sum(axis=1) == 0)
+        k = int(np.argmax(free))
+        square[k, column] = np.sign(m[k, column])
+    if np.linalg.det(square) < 0.5:
+        return q
+    nearest = rotation.from_matrix(square)
+    return nearest if rotation.angle_between(nearest, q) < np.radians(40.0) else q
+
+
+FLAT_PITCH_RAD = float(np.arcsin(bone_direction("leftFoot")[1]))

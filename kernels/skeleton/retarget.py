@@ -1,0 +1,248 @@
+"""A clip on any human rig becomes the same motion on the canonical skeleton.
+
+Conventions
+-----------
+Limbs take the directions that the source's limbs have; twists are carried from the source's joints; the root's way is
+scaled by the length of the legs about the world's origin, so heading and place stay. The floor becomes y = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from kernels import rotation
+from kernels.motion.contacts import FootContacts, find_contacts
+from kernels.skeleton import alignment, grounding, kinematics, topology
+from kernels.skeleton.alignment import SIDES, Rig, X, Y, bone_direction, unit
+from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
+from kernels.skeleton.naming import JointMapping
+from kernels.types import Clip, Float
+
+_STRAIGHTENED = tuple(
+    side + part for side in SIDES for part in ("Shoulder", "UpperArm", "LowerArm", "UpperLeg", "LowerLeg")
+)
+
+
+@dataclass(frozen=True, eq=False)
+class CanonicalMotion:
+    """A motion on the canonical skeleton.
+
+    Parameters
+    ----------
+    root_xyz_m : (F, 3) float64, metres, world
+    rotation_wxyz : (F, 22, 4) float64, local; the root's in the world
+        In one hemisphere from frame to frame, first frame with w >= 0.
+    position_xyz_m : (F, 22, 3) float64, metres, world
+    scale_ratio : float
+        Canonical leg length over the source's.
+    contacts : FootContacts
+        Of the source, at the canonical scale.
+    """
+
+    root_xyz_m: Float
+    rotation_wxyz: Float
+    position_xyz_m: Float
+    scale_ratio: float
+    contacts: FootContacts
+
+
+def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.Give | None = None) -> CanonicalMotion:
+    """Bring a clip to the canonical skeleton.
+
+    Parameters
+    ----------
+    clip : Clip
+        In metres, Y up, on its own rig.
+    mapping : JointMapping
+        From :func:`kernels.skeleton.naming.map_joints`.
+    give : grounding.Give, or None for the defaults
+        How far root and legs give way to keep planted feet planted.
+
+    Returns
+    -------
+    CanonicalMotion
+        Empty arrays where F is 0.
+
+    Raises
+    ------
+    ValueError
+        If the mapping names a joint the rig does not have, or the legs have no length.
+
+    Notes
+    -----
+    Each mapped joint turns its canonical joint by G N⁻¹, G its world orientation and N its neutral one
+    (:mod:`kernels.skeleton.alignment`); then the shortest arc brings upper and lower arms and legs and the shoulders
+    exactly to the source's directions, which also takes in joints between the mapped ones and rigs that move their
+    joints. The spine is taken as a curve from hips to neck: each canonical spine bone has the direction of its stretch
+    of the curve and the turn of the joints along it. Feet keep what lies flat flat. Last, the root and, within a few
+    degrees, the legs give way so that feet planted in the source are planted here (:mod:`kernels.skeleton.grounding`).
+    """
+    rig = _place(clip, mapping)
+    if clip.n_frames == 0:
+        none = np.zeros((0, 2, 3))
+        contacts = find_contacts(none, none, frame_rate_hz=clip.frame_rate_hz)
+        return CanonicalMotion(np.zeros((0, 3)), np.zeros((0, 22, 4)), np.zeros((0, 22, 3)), 1.0, contacts)
+    scale = LEG_LENGTH_M / _leg_length_m(rig)
+    ankle = scale * rig.position[:, [rig.at[side + "Foot"] for side in SIDES]]
+    toes = scale * rig.position[:, [rig.at.get(side + "Toes", rig.at[side + "Foot"]) for side in SIDES]]
+    contacts = find_contacts(ankle, toes, frame_rate_hz=clip.frame_rate_hz)
+    rig = replace(rig, planted_pitch_rad=_planted_pitch_rad(ankle, toes, contacts))
+    orientation = _orientations(rig)
+    legs = [JOINTS.index(side + "UpperLeg") for side in SIDES]
+    position = kinematics.hang(CANONICAL, np.zeros((clip.n_frames, 3)), orientation)
+    hips = scale * rig.position[:, [rig.at[side + "UpperLeg"] for side in SIDES]].mean(axis=1)
+    root = hips - position[:, legs].mean(axis=1)
+    root = root + grounding.plant_root(
+        position + root[:, None],
+        source_ankle_xyz_m=ankle,
+        source_toes_xyz_m=toes,
+        contacts=contacts,
+        frame_rate_hz=clip.frame_rate_hz,
+        give=give,
+    )
+    orientation = grounding.plant_legs(
+        position + root[:, None],
+        orientation,
+        source_ankle_xyz_m=ankle,
+        source_toes_xyz_m=toes,
+        contacts=contacts,
+        frame_rate_hz=clip.frame_rate_hz,
+        give=give,
+    )
+    return CanonicalMotion(
+        root_xyz_m=root,
+        rotation_wxyz=kinematics.to_local(CANONICAL, orientation),
+        position_xyz_m=kinematics.hang(CANONICAL, root, orientation),
+        scale_ratio=scale,
+        contacts=contacts,
+    )
+
+
+def _place(clip: Clip, mapping: JointMapping) -> Rig:
+    """Place the joints that matter: the mapped ones and all above them."""
+    skeleton = clip.skeleton
+    missing = [source for source in mapping.joint.values() if source not in skeleton.joints]
+    if missing:
+        raise ValueError(f"mapping: want joints of the clip's rig, got {', '.join(missing)}")
+    at = {name: skeleton.joints.index(source) for name, source in mapping.joint.items()}
+    needed = {k for joint in at.values() for k in topology.path_up(skeleton, joint)}
+    f, j = clip.n_frames, len(skeleton.joints)
+    position, orientation = np.zeros((j, f, 3)), np.zeros((j, f, 4))
+    local = np.ascontiguousarray(np.moveaxis(clip.rotation_wxyz, 1, 0), np.float64)
+    position[0], orientation[0] = clip.root_xyz_m, local[0]
+    for k in sorted(needed - {0}):
+        parent = skeleton.parent[k]
+        moved = clip.translation_xyz_m
+        offset = skeleton.offset_xyz_m[k] if moved is None else moved[:, k]
+        position[k] = position[parent] + rotation.apply(orientation[parent], offset)
+        orientation[k] = rotation.mul(orientation[parent], local[k])
+    spine, neck = topology.trunk(skeleton, mapping.joint)
+    return Rig(
+        clip=clip,
+        at=at,
+        spine=spine,
+        neck=neck,
+        rest=alignment.rest_position(clip),
+        position=np.moveaxis(position, 0, 1),
+        orientation=np.moveaxis(orientation, 0, 1),
+    )
+
+
+def _leg_length_m(rig: Rig) -> float:
+    """Thigh and shin, mean of both sides, by their usual length in the motion."""
+    length = 0.0
+    for side in SIDES:
+        for a, b in (("UpperLeg", "LowerLeg"), ("LowerLeg", "Foot")):
+            bone = rig.position[:, rig.at[side + b]] - rig.position[:, rig.at[side + a]]
+            length += float(np.median(np.linalg.norm(bone, axis=-1))) / 2
+    if not length > 1e-6:
+        raise ValueError("legs: want thighs and shins of some length, got none; check the joint mapping")
+    return length
+
+
+def _planted_pitch_rad(ankle: Float, toes: Float, contacts: FootContacts) -> float | None:
+    """Usual elevation of the direction from ankle to toes while both are planted; None where they never are."""
+    direction = unit(toes - ankle)[contacts.ankle & contacts.toes]
+    if len(direction) == 0 or not np.linalg.norm(direction, axis=-1).min() > 0.5:
+        return None
+    return float(np.median(np.arcsin(direction[:, 1].clip(-1, 1))))
+
+
+def _orientations(rig: Rig) -> Float:
+    """World orientations (F, 22, 4) of the canonical joints."""
+    neutral = alignment.neutral_orientations(rig)
+    P, G = rig.position, rig.orientation
+    out = np.tile(rotation.IDENTITY, (len(JOINTS), len(P), 1))
+
+    def turned(k: int) -> Float:
+        return rotation.mul(G[:, k], rotation.inv(neutral[k]))
+
+    def straighten(q: Float, axis: Float, direction: Float) -> Float:
+        is_bone = np.linalg.norm(direction, axis=-1) > 1e-9
+        aim = np.where(is_bone[:, None], direction, rotation.apply(q, axis))
+        return rotation.mul(rotation.between(rotation.apply(q, axis), aim), q)
+
+    hip_line = P[:, rig.at["leftUpperLeg"]] - P[:, rig.at["rightUpperLeg"]]
+    hips = straighten(turned(rig.at["hips"]), X, hip_line)
+    spine = _spine(rig, hips, [turned(k) for k in rig.spine])
+    for k, name in enumerate(JOINTS):
+        parent = out[CANONICAL.parent[k]] if k else out[0]
+        if name == "hips":
+            out[k] = hips
+        elif name in spine:
+            q, direction = spine[name]
+            out[k] = straighten(q, Y, direction)
+        elif name == "neck":
+            chain = rig.neck[:-1]
+            if chain:
+                length = [
+                    float(np.linalg.norm(rig.rest[b] - rig.rest[a])) for a, b in zip(chain, rig.neck[1:], strict=True)
+                ]
+                q = _blend([turned(a) for a in chain], np.maximum(length, 1e-9))
+                out[k] = straighten(q, Y, P[:, rig.neck[-1]] - P[:, chain[0]])
+            else:
+                out[k] = parent
+        elif name in rig.at:
+            out[k] = turned(rig.at[name])
+            child = alignment.BONE.get(name, "")
+            if name in _STRAIGHTENED and child in rig.at:
+                out[k] = straighten(out[k], bone_direction(name), P[:, rig.at[child]] - P[:, rig.at[name]])
+        else:
+            out[k] = parent
+    return rotation.normalize(np.moveaxis(out, 0, 1))
+
+
+def _spine(rig: Rig, hips: Float, turned: list[Float]) -> dict[str, tuple[Float, Float]]:
+    """Turn (F, 4) and direction (F, 3) of each canonical spine joint, from the curve of the source's spine."""
+    joints = [rig.at["hips"], *rig.spine, rig.neck[0]]
+    step = np.linalg.norm(np.diff(rig.rest[joints], axis=0), axis=-1)
+    if not step.sum() > 1e-9:
+        step = np.ones(len(step))
+    place = np.concatenate([[0.0], np.cumsum(step) / step.sum()])
+    curve = rig.position[:, joints]
+
+    def at(share: float) -> Float:
+        i = int(np.clip(np.searchsorted(place, share, side="right") - 1, 0, len(step) - 1))
+        t = (share - place[i]) / max(place[i + 1] - place[i], 1e-12)
+        return np.asarray((1 - t) * curve[:, i] + t * curve[:, i + 1], np.float64)
+
+    out = {}
+    edges = [*topology.SPINE.values(), 1.0]
+    for name, (a, b) in zip(topology.SPINE, pairwise(edges), strict=True):
+        overlap = np.minimum(place[1:], b) - np.maximum(place[:-1], a)
+        out[name] = _blend([hips, *turned], np.maximum(overlap, 0.0)), at(b) - at(a)
+    return out
+
+
+def _blend(q: list[Float], weight: Float) -> Float:
+    """Weighted mean of rotations (F, 4) that are not far apart."""
+    main = q[int(np.argmax(weight))]
+    total = np.zeros_like(main)
+    for rotation_wxyz, share in zip(q, weight, strict=True):
+        if share > 0:
+            near = np.where(np.sum(rotation_wxyz * main, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+            total += share * near * rotation_wxyz
+    return rotation.normalize(total)
