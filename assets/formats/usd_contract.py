@@ -174,11 +174,11 @@ def _body(stage: Usd.Stage) -> Iterator[Finding]:
     bindings = cache.ComputeSkelBindings(UsdSkel.Root(root), Usd.PrimDefaultPredicate)
     targets = [(target, binding) for binding in bindings for target in binding.GetSkinningTargets()]
     if not targets:
-        yield _error("body", str(root.GetPath()), "mesh: want one bound to the Skeleton, got none")
+        yield _error(
+            "body", str(root.GetPath()), "mesh: want one bound to the Skeleton, with SkelBindingAPI applied, got none"
+        )
     for target, binding in targets:
         prim, where = target.GetPrim(), str(target.GetPrim().GetPath())
-        if not prim.HasAPI(UsdSkel.BindingAPI):
-            yield _error("binding-api", where, "SkelBindingAPI: want it applied to the mesh, got it not")
         if not prim.IsA(UsdGeom.Mesh):
             continue
         mesh = UsdGeom.Mesh(prim)
