@@ -1,0 +1,138 @@
+"""What a dance pays for: seams, warp, half- and double-time, showing the same again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.types import Float, Int, MotionGraph
+
+
+@dataclass(frozen=True)
+class PathCosts:
+    """Prices and bounds of a path; without unit, about 1 for one ordinary seam.
+
+    Parameters
+    ----------
+    seam, transition : float, >= 0
+        A transition costs ``seam + transition · weight / scale``.
+    transition_scale : float, > 0, or None
+        Weight of a poor seam. None: the 95th percentile of the graph's weights.
+    warp, leaving, warp_outside : float, >= 0
+        A step of warp ratio r (song time ÷ clip time) costs ``warp · (ln r / ln 1.1)²``; outside the soft bounds
+        ``leaving + warp_outside · e`` more, e = 0 at the soft bound and 1 at the hard one, linear in ln r and beyond.
+    soft_ratio, hard_ratio : (low, high), 0 < low < 1 < high
+        Inside the soft bounds a warp is hardly seen. Outside the hard ones a step is used only where nothing else
+        reaches the last beat.
+    last_resort_ratio : (low, high)
+        Outside these a step is never used.
+    stride : float, >= 0
+        Price of each doubling or halving of time: a step of m motion beats over d music beats costs
+        ``stride · |log2(m / d)|``.
+    jump_back, jump_back_window_s : float, >= 0
+        A transition costs ``jump_back`` more when it goes back in its own clip by at most the window, in seconds.
+    usage : float, >= 0
+        Showing a stretch between two motion beats for the n-th time costs ``usage · (n − 1)``.
+
+    Raises
+    ------
+    ValueError
+        If a price is negative or not finite, or bounds are not nested around 1.
+    """
+
+    seam: float = 0.5
+    transition: float = 1.0
+    transition_scale: float | None = None
+    warp: float = 0.1
+    leaving: float = 2.0
+    warp_outside: float = 4.0
+    soft_ratio: tuple[float, float] = (0.90, 1.10)
+    hard_ratio: tuple[float, float] = (0.80, 1.25)
+    last_resort_ratio: tuple[float, float] = (0.4, 2.5)
+    stride: float = 0.25
+    jump_back: float = 1.0
+    jump_back_window_s: float = 8.0
+    usage: float = 0.5
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float | int) and not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"{field.name}: want finite, >= 0, got {value}")
+        if self.transition_scale == 0:
+            raise ValueError("transition_scale: want > 0, got 0")
+        (a, b), (c, d), (e, f) = self.last_resort_ratio, self.hard_ratio, self.soft_ratio
+        if not 0 < a <= c < e < 1 < f < d <= b:
+            raise ValueError(
+                "last_resort_ratio, hard_ratio, soft_ratio: want each within the one before and around 1, got "
+                f"{self.last_resort_ratio}, {self.hard_ratio}, {self.soft_ratio}"
+            )
+
+
+def warp_cost(ratio: Float, costs: PathCosts) -> Float:
+    """Price of playing a clip faster or slower.
+
+    Parameters
+    ----------
+    ratio : (...) float, > 0, song time ÷ clip time
+    costs : PathCosts
+
+    Returns
+    -------
+    (...) float64, >= 0
+        ``warp · (ln r / ln 1.1)²``, and outside the soft bounds ``leaving + warp_outside · e`` more, with e the part of
+        the way, in ln r, from the soft bound to the hard one.
+    """
+    stretch = np.log(np.asarray(ratio, np.float64))
+    (soft_low, soft_high), (hard_low, hard_high) = np.log(costs.soft_ratio), np.log(costs.hard_ratio)
+    excess = np.maximum((stretch - soft_high) / (hard_high - soft_high), (soft_low - stretch) / (soft_low - hard_low))
+    smooth = costs.warp * (stretch / np.log(1.1)) ** 2
+    return np.asarray(smooth + np.where(excess > 0, costs.leaving + costs.warp_outside * excess, 0.0), np.float64)
+
+
+def stride_cost(motion_beats: int, music_beats: int, costs: PathCosts) -> float:
+    """Price of dancing in half- or double-time: ``stride · |log2(m / d)|``; 0 for beat on beat."""
+    return costs.stride * abs(float(np.log2(motion_beats / music_beats)))
+
+
+def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:
+    """Price of each transition by its weight, (E,) float64: ``seam + transition · weight / scale``."""
+    scale = costs.transition_scale
+    if scale is None:
+        scale = float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0
+    return np.asarray(costs.seam + costs.transition * graph.weight / (scale if scale > 0 else 1.0), np.float64)
+
+
+def jump_back_cost(graph: MotionGraph, costs: PathCosts) -> Float:
+    """Price of each transition that goes back to what may just have been danced, (E,) float64."""
+    back_s = graph.time_s[graph.source] - graph.time_s[graph.target]
+    same = graph.clip_index[graph.source] == graph.clip_index[graph.target]
+    return np.where(same & (back_s >= 0) & (back_s <= costs.jump_back_window_s), costs.jump_back, 0.0)
+
+
+def usage_cost(shown: Int, n_nodes: int, costs: PathCosts) -> Float:
+    """Price of showing stretches again.
+
+    Parameters
+    ----------
+    shown : (M,) int64, first node of every stretch shown, in order of the dance
+    n_nodes : int
+    costs : PathCosts
+
+    Returns
+    -------
+    (M,) float64: ``usage`` times how often the stretch was shown before
+    """
+    order = np.argsort(shown, kind="stable")
+    ranked = shown[order]
+    earlier = np.arange(len(shown)) - np.searchsorted(ranked, ranked, "left")
+    cost = np.zeros(len(shown))
+    cost[order] = costs.usage * earlier
+    return cost
+
+
+def is_within(ratio: Float, bounds: tuple[float, float]) -> NDArray[np.bool_]:
+    """Whether warp ratios lie within bounds, with room for the last bits: (...) bool."""
+    return np.asarray((ratio >= bounds[0] * (1 - 1e-9)) & (ratio <= bounds[1] * (1 + 1e-9)))

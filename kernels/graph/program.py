@@ -1,0 +1,241 @@
+"""The dynamic program: cost to go from every node at every beat of the song.
+
+Conventions
+-----------
+K music intervals between the beats g_0 < … < g_K. A *step* (m, d) begins at node u on beat k, dances m motion beats of
+u's clip and ends on beat k + d. Two costs to go::
+
+    start[k, u]  = min over steps of  cost(k, u, step) + price(u, step) + arrive[k + d, u after m beats]
+    arrive[k, v] = min(start[k, v], min over transitions v → u of  cost(v → u) + start[k, u])
+
+A cost is finite exactly where the last beat can still be reached: the recursion runs backwards, so it *is* the backward
+reachability, and a decoded path can only use such nodes. No state exists for a step that is outside the bounds, or for
+one that ``admissible`` forbids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.graph.costs import PathCosts, is_within, jump_back_cost, stride_cost, transition_cost, warp_cost
+from kernels.types import Float, Int, MotionGraph
+
+Mask = NDArray[np.bool_]
+Move = tuple[int, int, int]
+"""One step of a path: music beat, node, index of the kind of step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Costs to go of the beats of a window, by beat; rows (N,) float64, infinite where there is no way on."""
+
+    start: Mapping[int, Float]
+    arrive: Mapping[int, Float]
+
+
+class Program:
+    """A graph, a song and prices, made ready.
+
+    Parameters
+    ----------
+    graph : MotionGraph of N nodes
+    beat_s : (K + 1,) float64, seconds, strictly increasing
+    steps : kinds of step (m, d), motion beats and music beats, each >= 1
+    costs : PathCosts
+    admissible : (K, N) bool or None
+        Whether music interval k may be danced with a step that starts at the node; a step must be admitted in every
+        interval that it covers. None admits all.
+    bounds : (low, high), warp ratios allowed
+    outside_price : float, >= 0
+        Added to a step outside the hard bounds: larger than any path costs otherwise, it makes their number the first
+        thing to be minimised.
+    """
+
+    def __init__(
+        self,
+        graph: MotionGraph,
+        beat_s: Float,
+        *,
+        steps: tuple[tuple[int, int], ...],
+        costs: PathCosts,
+        admissible: Mask | None,
+        bounds: tuple[float, float],
+        outside_price: float,
+    ) -> None:
+        self.graph, self.beat_s, self.steps, self.costs = graph, beat_s, steps, costs
+        self.n_nodes, self.n_beats = len(graph.clip_index), len(beat_s) - 1
+        self._admissible, self._bounds, self._outside_price = admissible, bounds, outside_price
+        order = np.lexsort((graph.target, graph.source))
+        self._source, self._target = graph.source[order], graph.target[order]
+        self.seam, self.jump_back = transition_cost(graph, costs)[order], jump_back_cost(graph, costs)[order]
+        self._edge_cost = self.seam + self.jump_back
+        self._leaving, self._first_edge = np.unique(self._source, return_index=True)
+        self._edge_of = np.searchsorted(self._source, np.arange(self.n_nodes + 1))
+        self.stride = [stride_cost(m, d, costs) for m, d in steps]
+        self.end, self.clip_s = [], []
+        for motion_beats, _ in steps:
+            end = np.arange(self.n_nodes)
+            for _ in range(motion_beats):
+                end = np.where(end >= 0, graph.next_node[end], -1)
+            self.end.append(end)
+            self.clip_s.append(np.where(end >= 0, graph.time_s[end] - graph.time_s, np.inf))
+
+    def step_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float | None:
+        """Cost of a kind of step at a beat, one a node: warp and stride; infinite where it cannot be danced.
+
+        None where the step would pass the last beat.
+        """
+        music_beats = self.steps[kind][1]
+        if beat + music_beats > self.n_beats:
+            return None
+        ratio = (self.beat_s[beat + music_beats] - self.beat_s[beat]) / self.clip_s[kind][nodes]
+        fits = is_within(ratio, self._bounds)
+        if self._admissible is not None:
+            fits &= self._admissible[beat : beat + music_beats, nodes].all(axis=0)
+        cost = np.full(ratio.shape, np.inf)
+        cost[fits] = warp_cost(ratio[fits], self.costs) + self.stride[kind]
+        if self._outside_price:
+            cost[fits & ~is_within(ratio, self.costs.hard_ratio)] += self._outside_price
+        return cost
+
+    def relax(self, start: Float) -> Float:
+        """Cost on arrival from the costs of starting a step: with the best transition, or none."""
+        arrive = start.copy()
+        if len(self._source):
+            best = np.minimum.reduceat(self._edge_cost + start[self._target], self._first_edge)
+            arrive[self._leaving] = np.minimum(arrive[self._leaving], best)
+        return arrive
+
+    def arrive_before(self, node: int) -> Float:
+        """Cost of being ready to step from one node, by the node where the step before ended, (N,)."""
+        cost = np.full(self.n_nodes, np.inf)
+        edge = np.flatnonzero(self._target == node)
+        cost[self._source[edge]] = self._edge_cost[edge]
+        cost[node] = 0.0
+        return cost
+
+    def solve(self, first: int, last: int, *, after: Mapping[int, Float], price: Float | None = None) -> Solution:
+        """Run the recursion over the beats first <= k < last.
+
+        Parameters
+        ----------
+        first, last : int, 0 <= first <= last <= K
+        after : by beat >= last, (N,) float64, cost to go on arrival there; a beat left out cannot be stepped onto
+        price : (N,) float64 or None
+            Added to every stretch between a node and the next, whenever it is danced.
+
+        Returns
+        -------
+        Solution; ``arrive`` has the beats of ``after`` too
+        """
+        start: dict[int, Float] = {}
+        arrive: dict[int, Float] = dict(after)
+        extra = self.stretch_price(price)
+        for beat in range(last - 1, first - 1, -1):
+            start[beat] = np.full(self.n_nodes, np.inf)
+            for kind, (_, music_beats) in enumerate(self.steps):
+                cost = self.step_cost(beat, kind) if beat + music_beats in arrive else None
+                if cost is not None:
+                    total = cost + extra[kind] + arrive[beat + music_beats][self.end[kind]]
+                    np.minimum(start[beat], total, out=start[beat])
+            arrive[beat] = self.relax(start[beat])
+        return Solution(start, arrive)
+
+    def decode(
+        self,
+        solution: Solution,
+        *,
+        first: int,
+        last: int,
+        arrived: int | None,
+        starts: Int,
+        price: Float | None = None,
+    ) -> list[Move]:
+        """Walk a solution forwards from beat ``first`` until a step ends on or after beat ``last``.
+
+        Parameters
+        ----------
+        arrived : node where the step before ended, or None at the song's first beat: then one of ``starts`` begins
+        price : as given to :meth:`solve`
+
+        Returns
+        -------
+        The moves, in order. Of equal costs: no transition before any, then the lower node, then the earlier kind.
+        """
+        extra = self.stretch_price(price)
+        beat, moves = first, []
+        while beat < last:
+            here = solution.start[beat]
+            if arrived is None:
+                node = int(starts[np.argmin(here[starts])])
+            else:
+                edge = slice(self._edge_of[arrived], self._edge_of[arrived + 1])
+                jump = self._edge_cost[edge] + here[self._target[edge]]
+                node = arrived
+                if len(jump) and jump.min() < here[arrived]:
+                    node = int(self._target[edge][np.argmin(jump)])
+            kind, best = -1, np.inf
+            for option, (_, music_beats) in enumerate(self.steps):
+                to = beat + music_beats
+                cost = self.step_cost(beat, option, np.array([node])) if to in solution.arrive else None
+                if cost is not None:
+                    total = cost[0] + extra[option][node] + solution.arrive[to][self.end[option][node]]
+                    if total < best:
+                        kind, best = option, total
+            moves.append((beat, node, kind))
+            beat, arrived = self.ends(moves[-1])
+        return moves
+
+    def ends(self, move: Move) -> tuple[int, int]:
+        """Beat and node where a move ends."""
+        beat, node, kind = move
+        return beat + self.steps[kind][1], int(self.end[kind][node])
+
+    def stretch_price(self, price: Float | None) -> list[Float]:
+        """Prices of the stretches that each kind of step covers, summed: one (N,) a kind."""
+        price = np.zeros(self.n_nodes) if price is None else price
+        prices = []
+        for motion_beats, _ in self.steps:
+            total, node = np.zeros(self.n_nodes), np.arange(self.n_nodes)
+            for _ in range(motion_beats):
+                total += price[node]
+                node = np.where(self.graph.next_node[node] >= 0, self.graph.next_node[node], node)
+            prices.append(total)
+        return prices
+
+    def stretches(self, moves: list[Move]) -> tuple[Int, Int]:
+        """First nodes of the stretches danced, in order, and the index of the move of each."""
+        node, move = [], []
+        for index, (_, at, kind) in enumerate(moves):
+            for _ in range(self.steps[kind][0]):
+                node.append(at)
+                move.append(index)
+                at = int(self.graph.next_node[at])
+        return np.array(node, np.int64), np.array(move, np.int64)
+
+    def edge(self, source: int, target: int) -> int:
+        """Index of a transition in :attr:`seam` and :attr:`jump_back`."""
+        low, high = self._edge_of[source], self._edge_of[source + 1]
+        return int(low + np.searchsorted(self._target[low:high], target))
+
+    def furthest(self, starts: Int) -> int:
+        """Last music beat that a dance from ``starts`` reaches; 0 when none begins."""
+        arrived = np.zeros((self.n_beats + 1, self.n_nodes), bool)
+        beat = 0
+        for at in range(self.n_beats):
+            ready = arrived[at].copy()
+            ready[self._target[arrived[at][self._source]]] = True
+            if at == 0:
+                ready[starts] = True
+            if not ready.any():
+                continue
+            beat = at
+            for kind, (_, music_beats) in enumerate(self.steps):
+                cost = self.step_cost(at, kind)
+                if cost is not None:
+                    arrived[at + music_beats][self.end[kind][ready & np.isfinite(cost)]] = True
+        return self.n_beats if arrived[-1].any() else beat

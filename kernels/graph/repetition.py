@@ -1,0 +1,117 @@
+"""Spreading a dance over the catalogue: the price of showing the same stretch again, taken over the whole song.
+
+How often a stretch is shown is no sum over steps, so the exact program cannot price it. Here windows of a known dance
+are solved again, each exactly, with every stretch priced at what one more showing would cost given the rest of the
+dance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kernels.graph.program import Move, Program, Solution
+from kernels.types import Int
+
+WINDOW = 16
+"""Music intervals solved at a time."""
+
+ADVANCE = 8
+"""Music intervals between the starts of two windows."""
+
+
+def spread(
+    program: Program,
+    whole: Solution,
+    moves: list[Move],
+    starts: Int,
+    rounds: int,
+    total: Callable[[list[Move]], float],
+) -> list[Move]:
+    """Improve a dance by total cost, repetition included.
+
+    Parameters
+    ----------
+    program : Program
+    whole : Solution over all beats, without prices
+    moves : the dance decoded from it: optimal but for repetition
+    starts : (M,) int64, nodes that may begin
+    rounds : int, >= 0; 0 changes nothing
+    total : true cost of a dance
+
+    Returns
+    -------
+    The cheapest dance met, never worse than ``moves``. Deterministic.
+
+    Notes
+    -----
+    1. *A dance made forwards.* Window by window from the song's start: every stretch costs ``usage`` times how often it
+       was shown so far; what follows the window costs what the exact solution says (a lower bound of the truth, and
+       finite only where the last beat is reached). The first half of each window is kept.
+    2. *Rounds.* The cheaper of the two dances is mended: each window is solved again between its neighbours, every
+       stretch priced by its showings outside the window, and kept when the whole dance becomes cheaper. After the first
+       round only windows that show something twice; a round without gain is the last.
+
+    Within a window a stretch may still come twice at the price of once: the window is short, and going back in the same
+    clip is priced by the program itself.
+    """
+    best, cost = moves, total(moves)
+    if rounds == 0 or program.costs.usage == 0 or not (_uses(program, best) > 1).any():
+        return best
+    made = _make_forwards(program, whole, starts)
+    if total(made) < cost:
+        best, cost = made, total(made)
+    for turn in range(rounds):
+        before = cost
+        offset = 0 if turn % 2 == 0 else -(WINDOW // 4)
+        for begin in range(offset, program.n_beats, ADVANCE):
+            mended = _mend(program, best, begin, starts)
+            if mended is not None and total(mended) < cost - 1e-9:
+                best, cost = mended, total(mended)
+        if not cost < before:
+            break
+    return best
+
+
+def _uses(program: Program, moves: list[Move]) -> Int:
+    """How often each stretch is danced, (N,) by its first node."""
+    return np.bincount(program.stretches(moves)[0], minlength=program.n_nodes)
+
+
+def _make_forwards(program: Program, whole: Solution, starts: Int) -> list[Move]:
+    moves: list[Move] = []
+    beat, arrived = 0, None
+    used = np.zeros(program.n_nodes, np.int64)
+    while beat < program.n_beats:
+        last = min(beat + WINDOW, program.n_beats)
+        reach = max(d for _, d in program.steps)
+        after = {k: whole.arrive[k] for k in range(last, min(last + reach, program.n_beats + 1))}
+        price = np.asarray(program.costs.usage * used, np.float64)
+        part = program.solve(beat, last, after=after, price=price)
+        stop = last if last == program.n_beats else beat + ADVANCE
+        new = program.decode(part, first=beat, last=stop, arrived=arrived, starts=starts, price=price)
+        used += _uses(program, new)
+        moves += new
+        beat, arrived = program.ends(new[-1])
+    return moves
+
+
+def _mend(program: Program, moves: list[Move], begin: int, starts: Int) -> list[Move] | None:
+    """Solve one window again, the rest of the dance as it is; None where there is nothing to gain."""
+    beats = np.array([beat for beat, _, _ in moves] + [program.n_beats])
+    low = int(np.searchsorted(beats, max(begin, 0)))
+    high = min(int(np.searchsorted(beats, begin + WINDOW)), len(moves))
+    if low >= high:
+        return None
+    inside, uses = moves[low:high], _uses(program, moves)
+    shown = np.unique(program.stretches(inside)[0])
+    if not (uses[shown] > 1).any():
+        return None
+    price = np.asarray(program.costs.usage * (uses - _uses(program, inside)), np.float64)
+    first, last = int(beats[low]), int(beats[high])
+    after = np.zeros(program.n_nodes) if high == len(moves) else program.arrive_before(moves[high][1])
+    part = program.solve(first, last, after={last: after}, price=price)
+    arrived = program.ends(moves[low - 1])[1] if low else None
+    new = program.decode(part, first=first, last=last, arrived=arrived, starts=starts, price=price)
+    return moves[:low] + new + moves[high:]
