@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,7 +45,7 @@ def pulse_features(level: Float, centre_hz: Float) -> Float:
     if n == 0:
         return out
     rise = flux(level)
-    for i, (low, high) in enumerate(zip(GROUP_EDGES_HZ, GROUP_EDGES_HZ[1:], strict=False)):
+    for i, (low, high) in enumerate(pairwise(GROUP_EDGES_HZ)):
         inside = (centre_hz >= low) & (centre_hz < high)
         if inside.any():
             out[:, i] = rise[:, inside].mean(axis=1)

@@ -235,13 +235,14 @@ def drum_machine_song(
         beat_in_bar_number=number % beats_per_bar + 1,
         confidence=np.ones(n_beats),
     )
-    return Song(sorted_notes(rows), beats, _tempo_map(edge_s, start_s), beats_per_bar)
+    return Song(sorted_notes(rows), beats, _tempo_map(edge_s, beats_per_bar), beats_per_bar)
 
 
-def _tempo_map(edge_s: Float, start_s: float) -> tuple[tuple[float, float], ...]:
-    """Write the tempo of each beat, repeats left out; silence before the first beat is one beat long."""
+def _tempo_map(edge_s: Float, beats_per_bar: int) -> tuple[tuple[float, float], ...]:
+    """Write the tempo of each beat, repeats left out; silence before the first beat is one bar, so that bars agree."""
+    start_s = float(edge_s[0])
     bpm = 60.0 / np.diff(edge_s)
-    changes = [(0.0, 60.0 / start_s)] if 60.0 / 6000.0 < start_s <= 60.0 / 4.0 else [(0.0, float(bpm[0]))]
+    changes = [(0.0, 60.0 * beats_per_bar / start_s if start_s > 0 else float(bpm[0]))]
     for time_s, tempo_bpm in zip(edge_s[:-1], bpm, strict=True):
         if time_s > 0 and abs(tempo_bpm / changes[-1][1] - 1.0) > 1e-9:
             changes.append((float(time_s), float(tempo_bpm)))
