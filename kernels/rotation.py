@@ -154,6 +154,40 @@ def from_euler(angle_rad: Floats | float, order: str) -> Float:
     return np.stack(q, axis=-1)
 
 
+def to_euler(q: Floats, order: str) -> Float:
+    """Decompose into intrinsic rotations about three axes, first letter outermost: the inverse of :func:`from_euler`.
+
+    Parameters
+    ----------
+    q : (..., 4) float, wxyz, unit
+    order : "xyz", "zxy" … three different letters
+
+    Returns
+    -------
+    (..., 3) float64, radians
+        The middle angle within -pi/2 to pi/2. Where it is at an end, the last angle is 0: only the sum is known there.
+
+    Raises
+    ------
+    ValueError
+        If ``order`` is not three different letters of xyz.
+    """
+    if sorted(order) != ["x", "y", "z"]:
+        raise ValueError(f"order: want three different letters of xyz, got {order!r}")
+    i, j, k = ("xyz".index(letter) for letter in order)
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    m = to_matrix(q)
+    flat = np.hypot(m[..., i, i], m[..., i, j])
+    is_locked = flat < 1e-9
+    first = np.where(
+        is_locked,
+        np.arctan2(sign * m[..., k, j], m[..., j, j]),
+        np.arctan2(-sign * m[..., j, k], m[..., k, k]),
+    )
+    last = np.where(is_locked, 0.0, np.arctan2(-sign * m[..., i, j], m[..., i, i]))
+    return np.stack([first, np.arctan2(sign * m[..., i, k], flat), last], axis=-1)
+
+
 def to_matrix(q: Floats) -> Float:
     """Write as rotation matrices for column vectors.
 

@@ -226,10 +226,8 @@ def _from_motion(rig: Rig) -> dict[int, Float]:
         turned[k] = rotation.mul(G[:, k], rotation.inv(neutral[k]))
 
     def follow(k: int, parent: int) -> None:
-        relative = _mean(rotation.mul(rotation.inv(turned[parent]), G[:, k]))
-        if is_square:
-            relative = _square_up(relative)
-        neutral[k] = relative
+        relative = _mean(rotation.mul(rotation.inv(G[:, parent]), G[:, k]))
+        neutral[k] = rotation.mul(neutral[parent], _square_up(relative) if is_square else relative)
         turned[k] = rotation.mul(G[:, k], rotation.inv(neutral[k]))
 
     def carry(parent: int, bone: Float, direction: Float, secondary: Float) -> Float:

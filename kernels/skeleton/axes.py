@@ -117,6 +117,18 @@ def rotations_to_y_up(rotation_wxyz: Float, up_axis: str) -> Float:
     return np.concatenate([rotation_wxyz[..., :1], vectors_to_y_up(rotation_wxyz[..., 1:], up_axis)], axis=-1)
 
 
+def vectors_from_y_up(vector: Float, up_axis: str) -> Float:
+    """Invert :func:`vectors_to_y_up`."""
+    if up_axis == "Y":
+        return np.asarray(vector, np.float64)
+    return np.stack([vector[..., 0], -vector[..., 2], vector[..., 1]], axis=-1)
+
+
+def rotations_from_y_up(rotation_wxyz: Float, up_axis: str) -> Float:
+    """Invert :func:`rotations_to_y_up`."""
+    return np.concatenate([rotation_wxyz[..., :1], vectors_from_y_up(rotation_wxyz[..., 1:], up_axis)], axis=-1)
+
+
 def _up_axis(skeleton: Skeleton, at: Mapping[str, int], position: Float, height: float) -> str:
     feet = [at["leftFoot"], at["rightFoot"]]
     standing = np.mean(position[:, at["head"]] - position[:, feet].mean(axis=1), axis=0)
