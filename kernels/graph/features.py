@@ -227,7 +227,7 @@ def _position_features(clip: _Clip, time_s: Float, weight: Float, velocity_time_
     root = np.sqrt(weight[used])[:, None]
     parts = [root * rotation.apply(turn, relative[:, used])]
     parts.append(velocity_time_s * root * rotation.apply(turn, velocity[:, used]))
-    linear = np.concatenate(parts, axis=1).reshape(len(time_s), -1)
+    linear = np.concatenate(parts, axis=1).reshape(len(time_s), 6 * len(used))
     return PoseFeatures("position", linear, np.zeros((len(time_s), 0, 4)), np.zeros(0))
 
 
@@ -244,7 +244,7 @@ def _rotation_features(clip: _Clip, time_s: Float, weight: Float, velocity_time_
     hips = np.sqrt(weight[0]) / LEG_LENGTH_M
     linear = np.concatenate(
         [
-            (velocity_time_s * np.sqrt(weight[used])[:, None] * spin[:, used]).reshape(len(time_s), -1),
+            (velocity_time_s * np.sqrt(weight[used])[:, None] * spin[:, used]).reshape(len(time_s), 3 * len(used)),
             hips * clip.position_at(time_s)[:, 0, 1:2],
             velocity_time_s * hips * rotation.apply(turn, travel),
         ],

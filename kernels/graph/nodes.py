@@ -73,7 +73,7 @@ class BeatNodes:
         """Ranges [first, last) of nodes of each node's clip nearer in time than ``guard_s``, itself included."""
         first, last = np.arange(len(self)), np.arange(1, len(self) + 1)
         starts = np.flatnonzero(self.previous_node < 0)
-        for start, end in zip(starts, np.append(starts[1:], len(self)), strict=True):
+        for start, end in zip(starts, np.append(starts, len(self))[1:], strict=True):
             time_s = self.time_s[start:end]
             first[start:end] = np.minimum(start + np.searchsorted(time_s, time_s - guard_s, "right"), first[start:end])
             last[start:end] = np.maximum(start + np.searchsorted(time_s, time_s + guard_s, "left"), last[start:end])

@@ -168,7 +168,8 @@ def nearest(
     )
     parts = list(search.tiles(rows))
     row, other, apart, weight = (np.concatenate([part[i] for part in parts]) for i in range(4))
-    return Nearest(row.astype(np.int64), other.astype(np.int64), apart, weight, min_margin_s)
+    order = np.lexsort((other, weight, row))
+    return Nearest(row[order], other[order], apart[order], weight[order], min_margin_s)
 
 
 def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float = THRESHOLD) -> Transitions:

@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from kernels.graph.nodes import BeatNodes, beat_nodes
+
+
+@pytest.fixture
+def nodes():
+    """Clip 0 has beats at 0.05, 0.55, 1.05, clip 1 none, clip 2 one, clip 3 two that end with the clip."""
+    beats = [np.array([0.05, 0.55, 1.05]), np.zeros(0), np.array([0.4]), np.array([0.3, 1.0])]
+    return beat_nodes(beats, [1.2, 1.0, 1.0, 1.0])
+
+
+def test_beats_in_a_row(nodes):
+    np.testing.assert_array_equal(nodes.clip_index, [0, 0, 0, 2, 3, 3])
+    np.testing.assert_array_equal(nodes.next_node, [1, 2, -1, -1, 5, -1])
+    np.testing.assert_array_equal(nodes.previous_node, [-1, 0, 1, -1, -1, 4])
+
+
+def test_a_blend_needs_frames_on_both_sides(nodes):
+    np.testing.assert_array_equal(nodes.may_leave(), [False, True, True, False, False, True])
+    np.testing.assert_array_equal(nodes.may_leave(0.1), [False, True, True, False, False, False])
+    np.testing.assert_array_equal(nodes.may_leave(0.2), [False, True, False, False, False, False])
+    np.testing.assert_array_equal(nodes.may_enter(), [True, True, False, False, True, False])
+    np.testing.assert_array_equal(nodes.may_enter(0.1), [False, True, False, False, True, False])
+
+
+@pytest.mark.parametrize("guard_s", [0.0, 0.3, 0.5, 0.50001, 5.0])
+def test_same_moment_is_nearer_than_the_guard(nodes, guard_s):
+    first, last = nodes.same_moment(guard_s)
+    for i in range(len(nodes)):
+        same = [
+            j
+            for j in range(len(nodes))
+            if i == j
+            or (nodes.clip_index[i] == nodes.clip_index[j] and abs(nodes.time_s[i] - nodes.time_s[j]) < guard_s - 1e-12)
+        ]
+        assert list(range(first[i], last[i])) == same
+
+
+def test_no_clips_and_no_beats():
+    for nodes in (beat_nodes([], []), beat_nodes([np.zeros(0)], [1.0])):
+        assert len(nodes) == len(nodes.next_node) == len(nodes.previous_node) == len(nodes.may_leave()) == 0
+        assert [len(part) for part in nodes.same_moment(0.5)] == [0, 0]
+
+
+def test_errors():
+    with pytest.raises(ValueError, match="one a clip, 1, got 2"):
+        beat_nodes([np.zeros(1)], [1.0, 2.0])
+    with pytest.raises(ValueError, match="sorted by clip"):
+        beat_nodes([np.array([0.5, 0.5])], [1.0])
+    with pytest.raises(ValueError, match="sorted by clip"):
+        BeatNodes(np.array([1, 0]), np.zeros(2), np.ones(2))
+    with pytest.raises(ValueError, match="0 to the clip's duration"):
+        beat_nodes([np.array([1.5])], [1.0])
+    with pytest.raises(ValueError, match="time_s: want"):
+        BeatNodes(np.zeros(2, int), np.zeros(1), np.ones(2))
