@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from kernels.graph.costs import (
+    PathCosts,
+    is_within,
+    jump_back_cost,
+    stride_cost,
+    transition_cost,
+    usage_cost,
+    warp_cost,
+)
+
+
+def test_warp_by_hand():
+    costs = PathCosts(warp=0.1, leaving=2.0, warp_outside=4.0)
+    ratio = np.array([1.0, 1.1, 1.25, 1.25**2 / 1.1])
+    expected = [
+        0.0,
+        0.1,
+        0.1 * (np.log(1.25) / np.log(1.1)) ** 2 + 2 + 4,
+        0.1 * (np.log(ratio[3]) / np.log(1.1)) ** 2 + 2 + 8,
+    ]
+    np.testing.assert_allclose(warp_cost(ratio, costs), expected)
+
+
+def test_warp_grows_away_from_the_clips_pace_and_jumps_at_the_soft_bound():
+    costs = PathCosts()
+    for ratio in (np.linspace(1, 3, 400), np.linspace(1, 0.3, 400)):
+        assert (np.diff(warp_cost(ratio, costs)) > 0).all()
+    inside, outside = warp_cost(np.array([0.9001, 0.8999]), costs)
+    assert inside <= 0.15
+    assert outside - inside > costs.leaving
+
+
+@pytest.mark.parametrize(
+    ("step", "expected"), [((1, 1), 0.0), ((2, 1), 0.25), ((1, 2), 0.25), ((4, 1), 0.5), ((2, 2), 0)]
+)
+def test_stride(step, expected):
+    assert stride_cost(*step, PathCosts(stride=0.25)) == expected
+
+
+def test_transitions_by_weight(make_graph):
+    graph = make_graph([[0, 1, 2], [0, 1, 2]], [(1, 4, 2.0), (2, 3, 8.0)])
+    costs = PathCosts(seam=0.5, transition=1.0, transition_scale=4.0)
+    cost = dict(zip(graph.source.tolist(), transition_cost(graph, costs), strict=True))
+    assert cost == {1: 1.0, 4: 1.0, 2: 2.5, 3: 2.5}
+    default = transition_cost(graph, PathCosts())
+    np.testing.assert_allclose(default, 0.5 + graph.weight / np.percentile(graph.weight, 95))
+    assert len(transition_cost(make_graph([[0, 1]]), PathCosts())) == 0
+    np.testing.assert_array_equal(transition_cost(make_graph([[0, 1], [0, 1]], [(1, 2, 0.0)]), PathCosts()), 0.5)
+
+
+def test_going_back_in_the_same_clip_within_the_window(make_graph):
+    graph = make_graph([[0, 1, 5, 20], [0, 1]], [(2, 0, 1.0), (2, 3, 1.0), (3, 1, 1.0), (2, 4, 1.0)], both_ways=False)
+    cost = {
+        (s, t): c
+        for s, t, c in zip(
+            graph.source.tolist(),
+            graph.target.tolist(),
+            jump_back_cost(graph, PathCosts(jump_back=0.7, jump_back_window_s=8.0)),
+            strict=True,
+        )
+    }
+    assert cost == {(2, 0): 0.7, (2, 3): 0.0, (3, 1): 0.0, (2, 4): 0.0}
+
+
+def test_each_showing_costs_as_often_as_it_was_shown_before():
+    got = usage_cost(np.array([4, 2, 4, 4, 2, 9]), 10, PathCosts(usage=0.5))
+    np.testing.assert_array_equal(got, [0, 0, 0.5, 1.0, 0.5, 0])
+    assert len(usage_cost(np.zeros(0, np.int64), 0, PathCosts())) == 0
+
+
+def test_bounds_have_room_for_the_last_bits():
+    assert is_within(np.array([0.5 / 0.4, 0.4 / 0.5, 1.2500001]), (0.8, 1.25)).tolist() == [True, True, False]
+
+
+def test_errors():
+    for change, message in [
+        ({"seam": -1.0}, "seam: want finite"),
+        ({"usage": np.inf}, "usage: want finite"),
+        ({"transition_scale": 0.0}, "transition_scale"),
+        ({"soft_ratio": (0.7, 1.1)}, "within the one before"),
+        ({"hard_ratio": (0.8, 3.0)}, "within the one before"),
+        ({"soft_ratio": (1.0, 1.1)}, "around 1"),
+    ]:
+        with pytest.raises(ValueError, match=message):
+            PathCosts(**change)
