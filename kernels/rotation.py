@@ -17,6 +17,14 @@ Floats = NDArray[np.float64] | NDArray[np.float32]
 IDENTITY: Float = np.array([1.0, 0.0, 0.0, 0.0])
 
 
+def _join(*component: Float) -> Float:
+    """Put components (...) side by side: np.stack along the last axis, with less ado."""
+    out = np.zeros((*component[0].shape, len(component)))
+    for k, values in enumerate(component):
+        out[..., k] = values
+    return out
+
+
 def normalize(q: Floats) -> Float:
     """Scale to unit length.
 
@@ -52,16 +60,14 @@ def mul(a: Floats, b: Floats) -> Float:
     -------
     (..., 4) float64
     """
-    aw, ax, ay, az = np.moveaxis(np.asarray(a, np.float64), -1, 0)
-    bw, bx, by, bz = np.moveaxis(np.asarray(b, np.float64), -1, 0)
-    return np.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
+    a, b = np.asarray(a, np.float64), np.asarray(b, np.float64)
+    aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    return _join(
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
     )
 
 
@@ -92,13 +98,12 @@ def apply(q: Floats, v: Floats) -> Float:
     -------
     (..., 3) float64
     """
-    w, x, y, z = np.moveaxis(np.asarray(q, np.float64), -1, 0)
-    a, b, c = np.moveaxis(np.asarray(v, np.float64), -1, 0)
+    q, v = np.asarray(q, np.float64), np.asarray(v, np.float64)
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    a, b, c = v[..., 0], v[..., 1], v[..., 2]
     # v + w t + u x t with u = (x, y, z) and t = 2 u x v, written out: np.cross is slower than the rest together.
     tx, ty, tz = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return np.stack(
-        [a + w * tx + (y * tz - z * ty), b + w * ty + (z * tx - x * tz), c + w * tz + (x * ty - y * tx)], -1
-    )
+    return _join(a + w * tx + (y * tz - z * ty), b + w * ty + (z * tx - x * tz), c + w * tz + (x * ty - y * tx))
 
 
 def from_axis_angle(axis: Floats, angle_rad: Floats | float) -> Float:
@@ -316,16 +321,23 @@ def between(u: Floats, v: Floats) -> Float:
     ValueError
         If a vector is zero or not finite.
     """
-    u, v = np.broadcast_arrays(np.asarray(u, np.float64), np.asarray(v, np.float64))
-    length = np.linalg.norm([u, v], axis=-1, keepdims=True)
-    if not (np.isfinite(length).all() and (length > 0).all()):
+    one, other = np.asarray(u, np.float64), np.asarray(v, np.float64)
+    length_one = np.sqrt(np.sum(one * one, axis=-1, keepdims=True))
+    length_other = np.sqrt(np.sum(other * other, axis=-1, keepdims=True))
+    both = length_one * length_other
+    if not (np.isfinite(both).all() and (both > 0).all()):
         raise ValueError("u, v: want finite directions of non-zero length, got a zero or a NaN")
-    u, v = u / length[0], v / length[1]
-    w = 1.0 + np.sum(u * v, axis=-1, keepdims=True)
+    one, other = one / length_one, other / length_other
+    a, b, c = one[..., 0], one[..., 1], one[..., 2]
+    x, y, z = other[..., 0], other[..., 1], other[..., 2]
+    w = 1.0 + (a * x + b * y + c * z)
+    q = _join(w, b * z - c * y, c * x - a * z, a * y - b * x)
     opposite = w < 1e-9
-    side = np.where(np.abs(u[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
-    perpendicular = side - u * np.sum(u * side, axis=-1, keepdims=True)
-    q = np.concatenate([np.where(opposite, 0.0, w), np.where(opposite, perpendicular, np.cross(u, v))], axis=-1)
+    if opposite.any():
+        u = np.broadcast_to(one, (*w.shape, 3))
+        side = np.where(np.abs(u[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+        perpendicular = side - u * np.sum(u * side, axis=-1, keepdims=True)
+        q[opposite] = np.concatenate([np.zeros((*w.shape, 1)), perpendicular], axis=-1)[opposite]
     return normalize(q)
 
 

@@ -207,16 +207,22 @@ def _check_feet(ankle_xyz_m: Float, toes_xyz_m: Float, frame_rate_hz: float) -> 
 
 
 def _height_and_speed(point: Float, frame_rate_hz: float, window_s: float) -> tuple[Float, Float]:
-    """Mean height and mean speed over the window around each frame, (F, 2) each; speed 0 for one frame."""
+    """Find the mean height over half the window around each frame, and the lesser speed before and after it.
+
+    (F, 2) each. The lesser of both, so that a short contact is not lost between two swings; 0 for one frame.
+    """
     n = len(point)
-    half = max(1, round(window_s * frame_rate_hz))
     at = np.arange(n)
+    half = int(window_s * frame_rate_hz / 2)
     before, after = np.maximum(at - half, 0), np.minimum(at + half, n - 1)
-    total = np.concatenate([np.zeros((1, *point.shape[1:])), np.cumsum(point, axis=0)])
-    height = ((total[after + 1] - total[before])[..., 1].T / (after + 1 - before)).T
-    span_s = np.maximum(after - before, 1) / frame_rate_hz
-    speed = np.linalg.norm(point[after] - point[before], axis=-1) / span_s[:, None]
-    return height, speed
+    total = np.concatenate([np.zeros((1, point.shape[1])), np.cumsum(point[..., 1], axis=0)])
+    height = (total[after + 1] - total[before]) / (after + 1 - before)[:, None]
+    step = min(max(1, round(window_s * frame_rate_hz)), n - 1)
+    if step == 0:
+        return height, np.zeros_like(height)
+    speed = np.linalg.norm(point[step:] - point[:-step], axis=-1) * (frame_rate_hz / step)
+    none = np.full((step, point.shape[1]), np.inf)
+    return height, np.minimum(np.concatenate([speed, none]), np.concatenate([none, speed]))
 
 
 def _standing(point: Float, planted_height_m: float, frame_rate_hz: float, limits: Thresholds) -> Bool:

@@ -73,12 +73,21 @@ def foot_direction(pitch_rad: float) -> Float:
 
 def unit(vector: Float) -> Float:
     """Vectors (..., 3) at length one; zero stays zero."""
-    return np.asarray(vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-12), np.float64)
+    return np.asarray(vector / np.maximum(np.sqrt(np.sum(vector * vector, axis=-1, keepdims=True)), 1e-12), np.float64)
 
 
 def turn(source: tuple[Float, Float], target: tuple[Float, Float]) -> Float:
-    """Rotation (..., 4) that takes a primary and a secondary direction to another pair; exact for the primary."""
-    return rotation.from_matrix(_square(*target) @ np.swapaxes(_square(*source), -1, -2))
+    """Rotation (4,) that takes a primary and a secondary direction (3,) to another pair; exact for the primary.
+
+    Parameters
+    ----------
+    source, target : two directions each, of any length, not parallel
+
+    Returns
+    -------
+    (4,) float64, wxyz, unit
+    """
+    return rotation.from_matrix(_square(*target) @ _square(*source).T)
 
 
 def rest_position(clip: Clip) -> Float:
@@ -117,10 +126,18 @@ def neutral_orientations(rig: Rig) -> dict[int, Float]:
 
 
 def _square(primary: Float, secondary: Float) -> Float:
-    """Right-handed axes (..., 3, 3) in columns: ``primary``, ``secondary`` made square to it, and their cross."""
-    a = unit(primary)
-    b = unit(secondary - a * np.sum(a * secondary, axis=-1, keepdims=True))
-    return np.stack([a, b, np.cross(a, b)], axis=-1)
+    """Right-handed axes (3, 3) in columns: ``primary``, ``secondary`` made square to it, and their cross."""
+    a = primary / np.sqrt(primary @ primary)
+    b = secondary - a * (a @ secondary)
+    b = b / max(float(np.sqrt(b @ b)), 1e-12)
+    return np.column_stack([a, b, _cross(a, b)])
+
+
+def _cross(a: Float, b: Float) -> Float:
+    """Cross product (..., 3), with less ado than np.cross."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
 def _snap(vector: Float, limit: float = 0.9) -> Float:
@@ -135,7 +152,7 @@ def _body_turn(rig: Rig) -> Float | None:
     at, rest = rig.at, rig.rest
     left = _snap(rest[at["leftUpperLeg"]] - rest[at["rightUpperLeg"]])
     up = _snap(rest[rig.neck[0]] - (rest[at["leftUpperLeg"]] + rest[at["rightUpperLeg"]]) / 2)
-    if np.linalg.norm(np.cross(left, up)) < 0.5:
+    if np.linalg.norm(_cross(left, up)) < 0.5:
         return None
     body = turn((left, up), (X, Y))
 
@@ -278,7 +295,7 @@ def _from_motion(rig: Rig) -> dict[int, Float]:
 def _bend(rig: Rig, side: str, limb: tuple[str, ...]) -> Float | None:
     """Axes (F, 3) about which elbow or knee bends, as long as the sine of the bend; None where it hardly does."""
     a, b, c = (rig.position[:, rig.at[side + part]] for part in _HINGE[limb])
-    axis = np.cross(unit(b - a), unit(c - b))
+    axis = _cross(unit(b - a), unit(c - b))
     return axis if np.sqrt(np.mean(np.sum(axis**2, axis=-1))) > np.sin(np.radians(5.0)) else None
 
 

@@ -28,6 +28,7 @@ THIGHS = [JOINTS.index("leftUpperLeg"), JOINTS.index("rightUpperLeg")]
 _REST = kinematics.rest_position(CANONICAL)
 ANKLE_HEIGHT_M = float(_REST[ANKLES[0], 1])
 TOES_HEIGHT_M = float(_REST[TOES[0], 1])
+_LOWEST_TOES_M = 0.01
 _THIGH_M = float(np.linalg.norm(CANONICAL.offset_xyz_m[KNEES[0]]))
 _SHIN_M = float(np.linalg.norm(CANONICAL.offset_xyz_m[ANKLES[0]]))
 
@@ -95,7 +96,8 @@ def plant_root(
         )
     height = np.array([ANKLE_HEIGHT_M, TOES_HEIGHT_M]) - [contacts.ankle_height_m, contacts.toes_height_m]
     lift = height[:, None, None] - error[..., 1]
-    weight = mask + 1e-4 * _is_lower(source)
+    weight = mask.astype(np.float64)
+    weight[1] += 1e-4 * _is_lower(source_toes_xyz_m)
     out[:, 1] = _solve(
         n, frame_rate_hz, give, place_weight=1e3 * weight.sum(axis=(0, 2)), place=1e3 * (weight * lift).sum(axis=(0, 2))
     )
@@ -133,22 +135,56 @@ def plant_legs(
     height = np.array([ANKLE_HEIGHT_M, TOES_HEIGHT_M]) - [contacts.ankle_height_m, contacts.toes_height_m]
     mask = np.stack([contacts.ankle, contacts.toes])
     mask[0] &= ~mask[1]
-    out = orientation_wxyz.copy()
+    shift = np.zeros((len(position_xyz_m), 2, 3))
+    n_fade = max(1, round(give.fade_s * frame_rate_hz))
     for side in range(2):
-        shift = np.zeros((len(position_xyz_m), 3))
         for k in range(2):
             start, stop = runs(mask[k, :, side])
             for a, b in zip(start, stop, strict=True):
                 error = point[k, a:b, side] - source[k, a:b, side]
                 wanted = error.mean(axis=0)
                 wanted[1] = height[k]
-                shift[a:b] = wanted - error
-        shift = _fade(shift, mask[0, :, side] | mask[1, :, side], max(1, round(give.fade_s * frame_rate_hz)))
-        hip, knee, ankle = (position_xyz_m[:, j[side]] for j in (THIGHS, KNEES, ANKLES))
-        hinge = rotation.apply(orientation_wxyz[:, THIGHS[side]], np.array([1.0, 0.0, 0.0]))
-        thigh, shin = _reach(hip, knee, ankle, shift, hinge, give.leg_limit_rad)
-        for joint, turn in ((THIGHS[side], thigh), (KNEES[side], shin)):
-            out[:, joint] = rotation.mul(turn, orientation_wxyz[:, joint])
+                shift[a:b, side] = wanted - error
+        shift[:, side] = _fade(shift[:, side], mask[0, :, side] | mask[1, :, side], n_fade)
+    out = orientation_wxyz.copy()
+    if not np.abs(shift).max(initial=0.0) > 1e-6:
+        return out
+    hip, ankle = position_xyz_m[:, THIGHS], position_xyz_m[:, ANKLES]
+    hinge = rotation.apply(orientation_wxyz[:, THIGHS], np.array([1.0, 0.0, 0.0]))
+    thigh, shin = _reach(hip, ankle, shift, hinge, give.leg_limit_rad)
+    out[:, THIGHS] = rotation.mul(thigh, orientation_wxyz[:, THIGHS])
+    out[:, KNEES] = rotation.mul(shin, orientation_wxyz[:, KNEES])
+    return out
+
+
+def lift_toes(position_xyz_m: Float, orientation_wxyz: Float) -> Float:
+    """Raise the tips of feet that would reach through the floor: feet of other lengths than the source's.
+
+    Parameters
+    ----------
+    position_xyz_m : (F, 22, 3) float, metres
+    orientation_wxyz : (F, 22, 4) float, world
+
+    Returns
+    -------
+    (F, 22, 4) float64, world orientations
+        Feet and toes turned about the ankle so that the toes joint keeps 1 cm above the floor, where the ankle is high
+        enough for that.
+    """
+    out = orientation_wxyz.copy()
+    for ankle, toes in zip(ANKLES, TOES, strict=True):
+        foot = position_xyz_m[:, toes] - position_xyz_m[:, ankle]
+        length = np.linalg.norm(foot, axis=-1)
+        low = _LOWEST_TOES_M - position_xyz_m[:, ankle, 1]
+        up = np.where((low > foot[:, 1]) & (low < 0.9 * length), low, foot[:, 1])
+        flat = np.linalg.norm(foot[:, [0, 2]], axis=-1)
+        ahead = rotation.apply(orientation_wxyz[:, ankle], np.array([0.0, 0.0, 1.0]))
+        level = np.where((flat > 1e-6)[:, None], foot, ahead) * np.array([1.0, 0.0, 1.0])
+        level /= np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-12)
+        raised = level * np.sqrt(np.maximum(length**2 - up**2, 0.0))[:, None] + up[:, None] * np.array([0.0, 1.0, 0.0])
+        turn = rotation.between(foot, np.where((up > foot[:, 1])[:, None], raised, foot))
+        out[:, ankle] = rotation.mul(turn, orientation_wxyz[:, ankle])
+        out[:, toes] = rotation.mul(turn, orientation_wxyz[:, toes])
     return out
 
 
@@ -157,10 +193,10 @@ def _points(position_xyz_m: Float) -> Float:
     return np.stack([position_xyz_m[:, ANKLES], position_xyz_m[:, TOES]])
 
 
-def _is_lower(source: Float) -> NDArray[np.bool_]:
-    """Whether a point is the lower foot's, (2, F, 2): something to go by where nothing is planted."""
-    height = source[..., 1]
-    return np.asarray(height <= height.min(axis=2, keepdims=True), np.bool_)
+def _is_lower(toes_xyz_m: Float) -> NDArray[np.bool_]:
+    """Tell the lower foot, (F, 2): something to go by where nothing is planted."""
+    height = toes_xyz_m[..., 1]
+    return np.asarray(height <= height.min(axis=1, keepdims=True), np.bool_)
 
 
 def _solve(
@@ -220,20 +256,24 @@ def _fade(shift: Float, is_planted: NDArray[np.bool_], n_fade: int) -> Float:
     return np.where(is_planted[:, None], shift, out)
 
 
-def _reach(hip: Float, knee: Float, ankle: Float, shift: Float, hinge: Float, limit_rad: float) -> tuple[Float, Float]:
-    """Find turns (F, 4) of thigh and shin that move the ankle by ``shift``, or towards it as far as the limit allows."""
-    share = np.ones((len(hip), 1))
-    for _ in range(3):
-        thigh, shin = _bend(hip, knee, ankle, ankle + share * shift, hinge)
+def _reach(hip: Float, ankle: Float, shift: Float, hinge: Float, limit_rad: float) -> tuple[Float, Float]:
+    """Find turns (..., 4) of thigh and shin that move the ankle by ``shift``, as far as the limit allows."""
+    thigh, shin = _bend(hip, ankle, ankle + shift, hinge)
+    for _ in range(2):
         angle = np.maximum(*(rotation.angle_between(rotation.IDENTITY, q) for q in (thigh, shin)))
-        share = share * np.minimum(1.0, limit_rad / np.maximum(angle, 1e-9))[:, None]
-    # The way from shift to angle is steep near the straight leg: what is left over the limit is cut.
+        far = angle > limit_rad
+        if not far.any():
+            return thigh, shin
+        shift = shift * np.where(far, limit_rad / np.maximum(angle, 1e-9), 1.0)[..., None]
+        thigh, shin = _bend(hip, ankle, ankle + shift, hinge)
+    # The way from shift to angle is steep near the straight leg: what is still over the limit is cut.
+    angle = np.maximum(*(rotation.angle_between(rotation.IDENTITY, q) for q in (thigh, shin)))
     cut = np.minimum(1.0, limit_rad / np.maximum(angle, 1e-9))
     return rotation.slerp(rotation.IDENTITY, thigh, cut), rotation.slerp(rotation.IDENTITY, shin, cut)
 
 
-def _bend(hip: Float, knee: Float, ankle: Float, target: Float, hinge: Float) -> tuple[Float, Float]:
-    """Find turns (F, 4) of thigh and shin that put the ankle on the target, the knee staying in its plane with it."""
+def _bend(hip: Float, ankle: Float, target: Float, hinge: Float) -> tuple[Float, Float]:
+    """Find turns (..., 4) of thigh and shin that put the ankle on the target, the knee staying in its plane with it."""
     reach = np.linalg.norm(target - hip, axis=-1).clip(abs(_THIGH_M - _SHIN_M) + 1e-6, _THIGH_M + _SHIN_M - 1e-9)
     now = np.linalg.norm(ankle - hip, axis=-1).clip(abs(_THIGH_M - _SHIN_M) + 1e-6, _THIGH_M + _SHIN_M - 1e-9)
 

@@ -112,6 +112,7 @@ def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.Give | None =
         frame_rate_hz=clip.frame_rate_hz,
         give=give,
     )
+    orientation = grounding.lift_toes(kinematics.hang(CANONICAL, root, orientation), orientation)
     return CanonicalMotion(
         root_xyz_m=root,
         rotation_wxyz=kinematics.to_local(CANONICAL, orientation),
@@ -174,49 +175,38 @@ def _planted_pitch_rad(ankle: Float, toes: Float, contacts: FootContacts) -> flo
 def _orientations(rig: Rig) -> Float:
     """World orientations (F, 22, 4) of the canonical joints."""
     neutral = alignment.neutral_orientations(rig)
-    P, G = rig.position, rig.orientation
-    out = np.tile(rotation.IDENTITY, (len(JOINTS), len(P), 1))
-
-    def turned(k: int) -> Float:
-        return rotation.mul(G[:, k], rotation.inv(neutral[k]))
-
-    def straighten(q: Float, axis: Float, direction: Float) -> Float:
-        is_bone = np.linalg.norm(direction, axis=-1) > 1e-9
-        aim = np.where(is_bone[:, None], direction, rotation.apply(q, axis))
-        return rotation.mul(rotation.between(rotation.apply(q, axis), aim), q)
-
-    hip_line = P[:, rig.at["leftUpperLeg"]] - P[:, rig.at["rightUpperLeg"]]
-    hips = straighten(turned(rig.at["hips"]), X, hip_line)
-    spine = _spine(rig, hips, [turned(k) for k in rig.spine])
-    for k, name in enumerate(JOINTS):
-        parent = out[CANONICAL.parent[k]] if k else out[0]
-        if name == "hips":
-            out[k] = hips
-        elif name in spine:
-            q, direction = spine[name]
-            out[k] = straighten(q, Y, direction)
-        elif name == "neck":
-            chain = rig.neck[:-1]
-            if chain:
-                length = [
-                    float(np.linalg.norm(rig.rest[b] - rig.rest[a])) for a, b in zip(chain, rig.neck[1:], strict=True)
-                ]
-                q = _blend([turned(a) for a in chain], np.maximum(length, 1e-9))
-                out[k] = straighten(q, Y, P[:, rig.neck[-1]] - P[:, chain[0]])
-            else:
-                out[k] = parent
-        elif name in rig.at:
-            out[k] = turned(rig.at[name])
-            child = alignment.BONE.get(name, "")
-            if name in _STRAIGHTENED and child in rig.at:
-                out[k] = straighten(out[k], bone_direction(name), P[:, rig.at[child]] - P[:, rig.at[name]])
-        else:
-            out[k] = parent
-    return rotation.normalize(np.moveaxis(out, 0, 1))
+    P = rig.position
+    driving = list(neutral)
+    back = rotation.inv(np.stack([neutral[k] for k in driving]))
+    turned = dict(zip(driving, np.moveaxis(rotation.mul(rig.orientation[:, driving], back), 1, 0), strict=True))
+    out = np.tile(rotation.IDENTITY, (len(P), len(JOINTS), 1))
+    named = {JOINTS.index(name): k for name, k in rig.at.items()}
+    for k, source in named.items():
+        out[:, k] = turned[source]
+    legs = [rig.at[side + "UpperLeg"] for side in SIDES]
+    out[:, 0] = _straighten(out[:, :1], X[None], P[:, legs[:1]] - P[:, legs[1:]])[:, 0]
+    _bend_spine(rig, out, turned)
+    bones = [(JOINTS.index(name), name) for name in _STRAIGHTENED if {name, alignment.BONE[name]} <= rig.at.keys()]
+    limbs = [k for k, _ in bones]
+    ends = [rig.at[alignment.BONE[name]] for _, name in bones]
+    starts = [rig.at[name] for _, name in bones]
+    axes = np.stack([bone_direction(name) for _, name in bones])
+    out[:, limbs] = _straighten(out[:, limbs], axes, P[:, ends] - P[:, starts])
+    for k in range(1, len(JOINTS)):
+        if k not in named and JOINTS[k] not in (*topology.SPINE, "neck"):
+            out[:, k] = out[:, CANONICAL.parent[k]]
+    return rotation.normalize(out)
 
 
-def _spine(rig: Rig, hips: Float, turned: list[Float]) -> dict[str, tuple[Float, Float]]:
-    """Turn (F, 4) and direction (F, 3) of each canonical spine joint, from the curve of the source's spine."""
+def _straighten(q: Float, axis: Float, direction: Float) -> Float:
+    """Swing orientations (F, K, 4) so that axes (K, 3) take directions (F, K, 3); zero directions are left alone."""
+    here = rotation.apply(q, axis)
+    is_bone = np.sum(direction * direction, axis=-1, keepdims=True) > 1e-18
+    return rotation.mul(rotation.between(here, np.where(is_bone, direction, here)), q)
+
+
+def _bend_spine(rig: Rig, out: Float, turned: dict[int, Float]) -> None:
+    """Fill in spine, chest, upperChest and neck: turns and directions of the source's spine, taken as a curve."""
     joints = [rig.at["hips"], *rig.spine, rig.neck[0]]
     step = np.linalg.norm(np.diff(rig.rest[joints], axis=0), axis=-1)
     if not step.sum() > 1e-9:
@@ -229,12 +219,23 @@ def _spine(rig: Rig, hips: Float, turned: list[Float]) -> dict[str, tuple[Float,
         t = (share - place[i]) / max(place[i + 1] - place[i], 1e-12)
         return np.asarray((1 - t) * curve[:, i] + t * curve[:, i + 1], np.float64)
 
-    out = {}
+    along = [out[:, 0], *(turned[k] for k in rig.spine)]
     edges = [*topology.SPINE.values(), 1.0]
+    direction = []
     for name, (a, b) in zip(topology.SPINE, pairwise(edges), strict=True):
         overlap = np.minimum(place[1:], b) - np.maximum(place[:-1], a)
-        out[name] = _blend([hips, *turned], np.maximum(overlap, 0.0)), at(b) - at(a)
-    return out
+        out[:, JOINTS.index(name)] = _blend(along, np.maximum(overlap, 0.0))
+        direction.append(at(b) - at(a))
+    *chain, head = rig.neck
+    neck = JOINTS.index("neck")
+    if chain:
+        length = np.linalg.norm(np.diff(rig.rest[rig.neck], axis=0), axis=-1)
+        out[:, neck] = _blend([turned[k] for k in chain], np.maximum(length, 1e-9))
+        direction.append(rig.position[:, head] - rig.position[:, chain[0]])
+    bent = [JOINTS.index(name) for name in topology.SPINE] + [neck] * bool(chain)
+    out[:, bent] = _straighten(out[:, bent], np.tile(Y, (len(bent), 1)), np.stack(direction, axis=1))
+    if not chain:
+        out[:, neck] = out[:, CANONICAL.parent[neck]]
 
 
 def _blend(q: list[Float], weight: Float) -> Float:
