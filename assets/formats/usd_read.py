@@ -133,7 +133,7 @@ def _from_usd(value: object) -> object:
     return value
 
 
-def reason(error: Tf.ErrorException) -> str:
+def reason(error: Exception) -> str:
     """Return the first thing USD says, without where in USD it says it."""
     first = next((line for line in str(error).splitlines() if line.strip()), "no reason given")
     return first.split(" : ", 1)[-1].strip().strip("'")
