@@ -218,9 +218,9 @@ def format(
             if program != sound:
                 rows.append((on, 1, bytes([0xBF + channel, program])))
                 sound = program
-            rows.append((on, 2, bytes([0x8F + channel, key, velocity])))
+            rows.append((on, 1, bytes([0x8F + channel, key, velocity])))
             rows.append((off, 0, bytes([0x7F + channel, key, 64])))
-        rows.sort(key=lambda row: row[:2])
+        rows.sort(key=lambda row: row[:2])  # stable: a program stays before its note, ends come before starts
         tracks.append(_format_track([(tick, event) for tick, _, event in rows]))
     return b"MThd" + struct.pack(">IHHH", 6, 1, len(tracks), TICKS_A_QUARTER) + b"".join(tracks)
 
