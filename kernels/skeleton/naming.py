@@ -157,8 +157,9 @@ def _user_joints(skeleton: Skeleton, extra: Mapping[str, str]) -> dict[str, str]
 def _by_name(skeleton: Skeleton, user: dict[str, str]) -> tuple[dict[str, str] | None, str]:
     """Joints of the family that knows most of the rig's names; None when none knows all that are required."""
     known: dict[tuple[str, str], str] = {}
+    shared = _shared_prefix(skeleton.joints)
     for name in skeleton.joints:
-        known.setdefault(side_and_part(name), name)
+        known.setdefault(side_and_part(name[len(shared) :]), name)
     best: dict[str, str] | None = None
     best_family = "user"
     for family, names in _FAMILIES.items():
@@ -194,6 +195,13 @@ def side_and_part(name: str) -> tuple[str, str]:
         if rest != joined and (rest in _VOCABULARY or (len(prefix) > 1 and rest)):
             return _SIDES[prefix], rest
     return "", joined
+
+
+def _shared_prefix(names: tuple[str, ...]) -> str:
+    """Find what all names start with, up to its last separator: a character's name."""
+    low, high = min(names), max(names)
+    n = next((k for k, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), min(len(low), len(high)))
+    return re.split(r"[^_.:|\s-]*$", low[:n])[0] if len(names) > 1 else ""
 
 
 def _add_ends(skeleton: Skeleton, joint: dict[str, str]) -> dict[str, str]:
