@@ -27,7 +27,7 @@ _LIMBS: dict[str, tuple[str, float, float, float]] = {
     "chest": ("upperChest", 0.135, 0.155, 0.70),
     "upperChest": ("neck", 0.165, 0.080, 0.66),
     "neck": ("head", 0.052, 0.050, 1.0),
-    "Shoulder": ("UpperArm", 0.045, 0.056, 1.0),
+    "Shoulder": ("UpperArm", 0.028, 0.056, 1.0),
     "UpperArm": ("LowerArm", 0.052, 0.040, 1.0),
     "LowerArm": ("Hand", 0.040, 0.028, 1.0),
     "UpperLeg": ("LowerLeg", 0.082, 0.058, 1.0),
