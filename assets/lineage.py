@@ -11,16 +11,13 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import dagster as dg
 import pyarrow as pa
 
 from assets import tables
 from schemas.table import Table
-
-SETTINGS_KEY = "odori/settings"
-SOURCES_KEY = "odori/sources"
 
 
 @dataclass(frozen=True)
@@ -90,6 +87,7 @@ class Parts:
     each: Iterable[Part]
 
 
+@runtime_checkable
 class Stored(Protocol):
     """An upstream asset on disk: partitions read one at a time, or rows of a few clips."""
 
@@ -242,40 +240,3 @@ def each_session(upstream: Stored, make: Callable[[str], Part]) -> Iterator[Part
 def clip_versions(stored: Stored, key: str, *also: str) -> dict[str, str]:
     """Version of what each clip's rows are made from: its content upstream, and ``also`` (code, settings)."""
     return {clip: version_of(stamp.content, *also) for clip, stamp in stored.stamp(key).clips.items()}
-
-
-def declared(
-    table: Table, *, group: str, code_version: str, settings: str = "", sources: str = "", io_manager: str = "lake"
-) -> dict[str, Any]:
-    """Arguments of an asset that stores a declared table: its name, meaning, columns and versions, said once.
-
-    Parameters
-    ----------
-    table : the declaration; also the asset's name
-    group : area of the asset graph
-    code_version : raised by hand when the meaning of the output changes
-    settings : sections of ``odori.toml`` it reads, separated by spaces
-    sources : "clips" or "song" when it reads source files of its partition
-    io_manager : who stores it
-    """
-    return {
-        "group_name": group,
-        "code_version": code_version,
-        "description": table.meaning,
-        "metadata": {
-            "dagster/column_schema": column_schema(table),
-            SETTINGS_KEY: settings,
-            SOURCES_KEY: sources,
-        },
-        "io_manager_key": io_manager,
-    }
-
-
-def column_schema(table: Table) -> dg.TableSchema:
-    """Columns of a table as Dagster's UI shows them."""
-    columns = []
-    for column in table.columns:
-        meaning = f"{column.meaning} [{column.unit}]" if column.unit else column.meaning
-        constraints = dg.TableColumnConstraints(nullable=column.is_optional, unique=table.key == (column.name,))
-        columns.append(dg.TableColumn(column.name, str(column.type), meaning, constraints))
-    return dg.TableSchema(columns)

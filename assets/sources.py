@@ -9,7 +9,7 @@ import json
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -91,6 +91,18 @@ class Sources:
         return {key: tuple(found[key]) for key in sorted(found)}
 
 
+@dataclass(frozen=True)
+class Request:
+    """What a person asked of one dance beside the brief; remembered, so that a nightly rebuild makes the same.
+
+    Parameters
+    ----------
+    frame_rate_hz : frames a second of the stage; 0 for the setting
+    """
+
+    frame_rate_hz: float = 0.0
+
+
 class Studio(Protocol):
     """What assets ask of a studio folder."""
 
@@ -108,6 +120,10 @@ class Studio(Protocol):
 
     def file(self, path: str) -> Path:
         """Place of a source on disk."""
+        ...
+
+    def requests(self) -> Mapping[str, Request]:
+        """List what was asked of dances, by ``<song>|<method>``."""
         ...
 
 
@@ -282,3 +298,13 @@ def brief_version(studio: Studio, songs: Iterable[Song]) -> str:
         if beats and beats_place.is_file():
             said.append(tree.sha256(beats_place))
     return fingerprint(said)
+
+
+def request_of(studio: Studio, key: str) -> Request:
+    """Find what was asked of a dance; nothing special where nobody asked."""
+    return studio.requests().get(key, Request())
+
+
+def request_version(studio: Studio, key: str) -> str:
+    """Version of what was asked of a dance."""
+    return fingerprint(asdict(request_of(studio, key)))

@@ -18,6 +18,10 @@ from numpy.typing import NDArray
 from kernels.assembly.blend import Dance, Lineage
 from kernels.assembly.quality import Measure
 from kernels.motion.beats import MotionBeats
+from kernels.music.beats import TempoCandidate
+from kernels.skeleton.canonical import JOINTS
+from kernels.skeleton.naming import JointMapping
+from kernels.skeleton.retarget import CanonicalMotion
 from kernels.types import BeatGrid, Choreography, Clip, Float, Int, MotionGraph, Skeleton
 from schemas.choreography import CHOREOGRAPHY, DANCE_POSE, DANCE_QUALITY, FRAME_LINEAGE
 from schemas.fields import QUATERNION, VECTOR
@@ -101,29 +105,35 @@ def to_numbers(column: pa.ChunkedArray) -> NDArray[Any]:
 # Skeletons and poses -----------------------------------------------------------------------------------------------
 
 
-def from_skeleton(clip_id: str, skeleton: Skeleton, canonical: Mapping[int, str]) -> pa.Table:
-    """Pack a source skeleton, J rows; ``canonical`` names the canonical joint that a source joint drives."""
+def from_skeleton(clip_id: str, skeleton: Skeleton, mapping: JointMapping) -> pa.Table:
+    """Pack a source skeleton, J rows, each with the canonical joints it drives, joined by commas."""
     j = len(skeleton.joints)
+    drives: dict[str, list[str]] = {}
+    for name, joint in mapping.joint.items():
+        drives.setdefault(joint, []).append(name)
     columns = [
         pa.array([clip_id] * j, pa.string()),
         pa.array(np.arange(j), pa.int32()),
         pa.array(skeleton.joints, pa.string()),
         pa.array(skeleton.parent, pa.int32()),
         vector(skeleton.offset_xyz_m),
-        pa.array([canonical.get(k) for k in range(j)], pa.string()),
+        pa.array([",".join(drives[name]) if name in drives else None for name in skeleton.joints], pa.string()),
     ]
     return SKELETON.check(pa.table(columns, schema=SKELETON.arrow))
 
 
-def to_skeleton(rows: pa.Table) -> tuple[Skeleton, dict[str, int]]:
-    """Unpack one clip's skeleton, and from canonical joint to source joint index."""
-    skeleton = Skeleton(
-        tuple(rows["joint_name"].to_pylist()),
-        to_numbers(rows["parent_index"]).astype(np.int64),
-        to_array(rows["offset_xyz_m"]),
-    )
-    drives = {name: k for k, name in enumerate(rows["canonical_joint"].to_pylist()) if name is not None}
-    return skeleton, drives
+def to_skeleton(rows: pa.Table) -> tuple[Skeleton, JointMapping]:
+    """Unpack one clip's skeleton, and which of its joints is which canonical one."""
+    joints = tuple(rows["joint_name"].to_pylist())
+    parent = to_numbers(rows["parent_index"]).astype(np.int64)
+    skeleton = Skeleton(joints, parent, to_array(rows["offset_xyz_m"]))
+    driven = {
+        name: joint
+        for joint, names in zip(joints, rows["canonical_joint"].to_pylist(), strict=True)
+        for name in (names or "").split(",")
+        if name
+    }
+    return skeleton, JointMapping({name: driven[name] for name in JOINTS if name in driven}, "stored")
 
 
 def from_pose(clip_id: str, clip: Clip) -> pa.Table:
@@ -141,12 +151,18 @@ def from_pose(clip_id: str, clip: Clip) -> pa.Table:
     return POSE.check(pa.table(columns, schema=POSE.arrow))
 
 
-def to_pose(rows: pa.Table, skeleton: Skeleton, frame_rate_hz: float) -> Clip:
+def frame_rate_hz(rows: pa.Table) -> float:
+    """Frame rate of one clip's rows, read from their times; 1 Hz for a single frame."""
+    time_s = to_numbers(rows["time_s"])
+    return float(np.round((len(time_s) - 1) / (time_s[-1] - time_s[0]), 6)) if len(time_s) > 1 else 1.0
+
+
+def to_pose(rows: pa.Table, skeleton: Skeleton) -> Clip:
     """Unpack one clip on its own skeleton."""
     moved = rows["translation_xyz_m"]
     return Clip(
         skeleton,
-        frame_rate_hz,
+        frame_rate_hz(rows),
         to_array(rows["root_xyz_m"]),
         to_array(rows["rotation_wxyz"]),
         None if moved.null_count == len(moved) else to_array(moved),
@@ -169,28 +185,26 @@ class CanonicalClip:
         return max(len(self.root_xyz_m) - 1, 0) / self.frame_rate_hz
 
 
-def from_canonical_pose(clip: CanonicalClip, joints: Sequence[str]) -> pa.Table:
+def from_canonical_pose(clip_id: str, frame_rate_hz: float, motion: CanonicalMotion) -> pa.Table:
     """Pack a clip on the canonical skeleton, F rows; the joints' order goes into the schema metadata."""
-    f = len(clip.root_xyz_m)
+    f = len(motion.root_xyz_m)
     columns = [
-        pa.array([clip.clip_id] * f, pa.string()),
+        pa.array([clip_id] * f, pa.string()),
         pa.array(np.arange(f), pa.int32()),
-        pa.array(np.arange(f) / clip.frame_rate_hz),
-        vector(clip.root_xyz_m),
-        vectors(clip.rotation_wxyz),
-        vectors(clip.position_xyz_m),
+        pa.array(np.arange(f) / frame_rate_hz),
+        vector(motion.root_xyz_m),
+        vectors(motion.rotation_wxyz),
+        vectors(motion.position_xyz_m),
     ]
     table = CANONICAL_POSE.check(pa.table(columns, schema=CANONICAL_POSE.arrow))
-    return CANONICAL_POSE.with_metadata(table, {"joints": ",".join(joints)})
+    return CANONICAL_POSE.with_metadata(table, {"joints": ",".join(JOINTS)})
 
 
 def to_canonical_pose(rows: pa.Table) -> CanonicalClip:
     """Unpack one clip on the canonical skeleton; its rate is read from the times, 1 Hz for a single frame."""
-    time_s = to_numbers(rows["time_s"])
-    rate_hz = (len(time_s) - 1) / (time_s[-1] - time_s[0]) if len(time_s) > 1 else 1.0
     return CanonicalClip(
         rows["clip_id"][0].as_py(),
-        float(np.round(rate_hz, 6)),
+        frame_rate_hz(rows),
         to_array(rows["root_xyz_m"]),
         to_array(rows["rotation_wxyz"]),
         to_array(rows["position_xyz_m"]),
@@ -246,26 +260,27 @@ def to_music_beat(rows: pa.Table) -> BeatGrid:
     )
 
 
-def from_music_tempo(song_id: str, ratio: Float, tempo_bpm: Float, score: Float) -> pa.Table:
-    """Pack the candidates for a song's metrical level; the one of ratio 1 is chosen."""
-    n = len(ratio)
-    columns = [
-        pa.array([song_id] * n, pa.string()),
-        pa.array(ratio, pa.float32()),
-        pa.array(tempo_bpm, pa.float32()),
-        pa.array(score, pa.float32()),
-        pa.array(np.asarray(ratio) == 1.0),
+def from_music_tempo(song_id: str, candidates: Sequence[TempoCandidate]) -> pa.Table:
+    """Pack the candidates for a song's metrical level, one row each."""
+    rows = [
+        {
+            "song_id": song_id,
+            "level_ratio": c.level_ratio,
+            "tempo_bpm": c.tempo_bpm,
+            "tempo_score": c.score,
+            "is_chosen": c.is_chosen,
+        }
+        for c in candidates
     ]
-    return MUSIC_TEMPO.check(pa.table(columns, schema=MUSIC_TEMPO.arrow))
+    return from_rows(MUSIC_TEMPO, rows)
 
 
-def from_music_loudness(song_id: str, time_s: Float, loudness_db: Float, onset: Float) -> pa.Table:
-    """Pack a song's loudness and onset curves."""
+def from_music_loudness(song_id: str, time_s: Float, loudness_db: Float) -> pa.Table:
+    """Pack a song's loudness curve."""
     columns = [
         pa.array([song_id] * len(time_s), pa.string()),
         pa.array(time_s),
         pa.array(loudness_db, pa.float32()),
-        pa.array(onset, pa.float32()),
     ]
     return MUSIC_LOUDNESS.check(pa.table(columns, schema=MUSIC_LOUDNESS.arrow))
 
@@ -360,7 +375,7 @@ def to_choreography(rows: pa.Table) -> Choreography:
 _STEP_SECONDS = ("song_start_s", "song_end_s", "clip_start_s", "clip_end_s", "blend_s")
 
 
-def from_dance_pose(song_id: str, method: str, dance: Dance, joints: Sequence[str]) -> pa.Table:
+def from_dance_pose(song_id: str, method: str, dance: Dance) -> pa.Table:
     """Pack the frames of a dance, F rows; the joints' order goes into the schema metadata."""
     f = len(dance.root_xyz_m)
     columns = [
@@ -373,7 +388,7 @@ def from_dance_pose(song_id: str, method: str, dance: Dance, joints: Sequence[st
         vectors(dance.position_xyz_m),
     ]
     table = DANCE_POSE.check(pa.table(columns, schema=DANCE_POSE.arrow))
-    return DANCE_POSE.with_metadata(table, {"joints": ",".join(joints)})
+    return DANCE_POSE.with_metadata(table, {"joints": ",".join(JOINTS)})
 
 
 def from_frame_lineage(song_id: str, method: str, dance: Dance, steps: Choreography) -> pa.Table:
@@ -389,7 +404,7 @@ def from_frame_lineage(song_id: str, method: str, dance: Dance, steps: Choreogra
         pa.array(dance.time_s),
         pa.array(names[line.step_index].tolist(), pa.string()),
         pa.array(line.clip_time_s),
-        pa.array(np.where(alone, None, names[line.blend_step_index]).tolist(), pa.string()),
+        pa.array(names[line.blend_step_index].tolist(), pa.string(), mask=alone),
         pa.array(line.blend_time_s, pa.float64(), mask=alone),
         pa.array(np.where(alone, 0.0, line.blend_weight), pa.float32()),
         pa.array(steps.warp_ratio[line.step_index], pa.float32()),
@@ -400,11 +415,10 @@ def from_frame_lineage(song_id: str, method: str, dance: Dance, steps: Choreogra
 def to_dance(pose: pa.Table, lineage: pa.Table, steps: Choreography) -> Dance:
     """Unpack a dance; the steps of its lineage are found again by song time."""
     time_s = to_numbers(pose["time_s"])
-    rate_hz = float(np.round((len(time_s) - 1) / time_s[-1], 6)) if len(time_s) > 1 else 1.0
     step = np.clip(np.searchsorted(steps.song_start_s, time_s + 1e-9, side="right") - 1, 0, len(steps.clip_id) - 1)
     blend_time_s = lineage["blend_time_s"].to_numpy()
     return Dance(
-        rate_hz,
+        frame_rate_hz(pose),
         to_array(pose["root_xyz_m"]),
         to_array(pose["rotation_wxyz"]),
         to_array(pose["position_xyz_m"]),

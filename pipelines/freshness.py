@@ -14,8 +14,9 @@ from typing import Literal
 import dagster as dg
 
 from assets import sources as source_kinds
-from assets.lineage import SETTINGS_KEY, SOURCES_KEY, Stamp, version_of
-from assets.partitions import METHODS, song_and_method
+from assets.declare import SETTINGS_KEY, SOURCES_KEY
+from assets.lineage import Stamp, version_of
+from assets.partitions import METHODS
 from assets.sources import Sources, Studio
 from pipelines.lake import Lake
 
@@ -25,7 +26,7 @@ State = Literal["fresh", "stale", "missing", "waiting"]
 
 @dataclass(frozen=True)
 class Node:
-    """One asset as freshness sees it."""
+    """One asset as freshness sees it; ``together`` are the assets made in the same pass, itself included."""
 
     name: str
     group: str
@@ -34,6 +35,7 @@ class Node:
     inputs: tuple[str, ...]
     settings: tuple[str, ...]
     sources: str
+    together: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
     """Read the asset graph, in an order in which inputs come first."""
     found: dict[str, Node] = {}
     for definition in assets:
+        together = tuple(sorted(key.to_user_string() for key in definition.keys))
         for spec in definition.specs:
             found[spec.key.to_user_string()] = Node(
                 spec.key.to_user_string(),
@@ -59,6 +62,7 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
                 tuple(sorted(dep.asset_key.to_user_string() for dep in spec.deps)),
                 tuple(str(spec.metadata.get(SETTINGS_KEY, "")).split()),
                 str(spec.metadata.get(SOURCES_KEY, "")),
+                together,
             )
     ordered: dict[str, Node] = {}
     while len(ordered) < len(found):
@@ -113,7 +117,8 @@ class Freshness:
             return list(self.sources.songs_by_key())
         if kind == "dance":
             songs = set(self.keys("song"))
-            return [k for k in self._lake.keys("choreography") if k.split("|")[0] in songs]
+            asked = {*self._studio.requests(), *self._lake.keys("choreography")}
+            return sorted(k for k in asked if k.split("|")[0] in songs)
         return [""]
 
     def settings_version(self, asset: str) -> str:
@@ -130,6 +135,8 @@ class Freshness:
             songs = self.sources.songs_by_key().get(key, ())
             brief = source_kinds.brief_version(self._studio, songs)
             return version_of(source_kinds.song_version(songs), brief)
+        if kind == "request":
+            return source_kinds.request_version(self._studio, key)
         return ""
 
     def inputs(self, asset: str, key: str) -> dict[str, str] | None:
@@ -204,6 +211,3 @@ class Freshness:
                     if k.split("|")[0] not in songs or k.split("|")[-1] not in METHODS
                 ]
         return found
-
-
-__all__ = ["Finding", "Freshness", "Node", "nodes", "song_and_method"]

@@ -3,17 +3,24 @@
 Assets return tables or records, never paths; only this module and the lake know paths.
 """
 
+import json
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import dagster as dg
 import pyarrow as pa
 
+from assets import tables
+from assets.dance import Stage
+from assets.formats import audio, tree, usd, usd_package
 from assets.lineage import Part, Parts, Stamp, content_version
 from assets.partitions import dagster_key, lake_key
 from pipelines.freshness import Freshness
-from pipelines.lake import Lake, LakeError
+from pipelines.lake import Lake, LakeError, why, write_beside
+from pipelines.resources import StudioFolder
 from schemas.catalog import TABLES
+from schemas.choreography import USD_ANIMATION
 
 
 class StoredTable:
@@ -107,3 +114,58 @@ def _parts(obj: pa.Table | Part | Parts, keys: Sequence[str]) -> Iterable[Part]:
     if isinstance(obj, Parts):
         return obj.each
     return [obj if isinstance(obj, Part) else Part(keys[0], obj)]
+
+
+class StageIOManager(LakeIOManager):
+    """Writes a :class:`~assets.dance.Stage` as USD under ``dances/``, with a row in the lake that names it."""
+
+    def __init__(self, studio: StudioFolder, freshness: Freshness) -> None:
+        super().__init__(studio.lake, freshness)
+        self._studio = studio
+
+    def handle_output(self, context: dg.OutputContext, obj: Any) -> None:  # noqa: ANN401 - a Stage, narrower than the parent's
+        """Write sound, stage, package and report, then the row."""
+        if not isinstance(obj, Stage):
+            raise TypeError(f"usd_animation: want a Stage, got {type(obj).__name__}")
+        folder = self._studio.dances / obj.song_id
+        try:
+            written = write_dance(folder, obj)
+        except OSError as error:
+            raise LakeError(f"{folder}: cannot be written: {why(error)}") from error
+        rows = [
+            {
+                "song_id": obj.song_id,
+                "method_name": obj.method,
+                "stage_path": str(path.relative_to(self._studio.root)),
+                "stage_sha256": tree.sha256(path),
+                "frame_count": obj.clip.n_frames,
+                "frame_rate_hz": obj.clip.frame_rate_hz,
+            }
+            for path in written
+        ]
+        super().handle_output(context, tables.from_rows(USD_ANIMATION, rows))
+
+
+def write_dance(folder: Path, stage: Stage) -> list[Path]:
+    """Write a dance: ``song.wav``, ``<method>.usdc``, ``<method>.usdz`` and ``<method>.json``; the stages' paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    sound, usdc, usdz = folder / "song.wav", folder / f"{stage.method}.usdc", folder / f"{stage.method}.usdz"
+    audio.write_wav(sound, stage.sound)
+    usd.write_stage(
+        usdc, stage.clip, audio=sound.name, provenance=stage.provenance, title=f"{stage.song_id}, {stage.method}"
+    )
+    usd_package.write_package(usdz, usdc)
+    report = {
+        "song": stage.song_id,
+        "method": stage.method,
+        "stage": usdc.name,
+        "usdz": usdz.name,
+        "frame_count": stage.clip.n_frames,
+        "frame_rate_hz": stage.clip.frame_rate_hz,
+        "quality": {name: measure["value"] for name, measure in stage.quality.items()},
+        "wanted": {name: m for name, m in stage.quality.items() if m["wanted"]},
+        "provenance": stage.provenance,
+    }
+    text = json.dumps(report, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    write_beside(folder / f"{stage.method}.json", lambda file: file.write(text.encode()))
+    return [usdc, usdz]

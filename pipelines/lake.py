@@ -104,7 +104,7 @@ class Lake:
 
 
 def _write_parquet(table: pa.Table, file: IO[bytes]) -> None:
-    is_framewise = "frame_index" in table.schema.names and "clip_id" in table.schema.names
+    is_framewise = TABLES[table.schema.metadata[b"table"].decode()].key == ("clip_id", "frame_index")
     parts = list(tables.by_clip(table).values()) if is_framewise and table.num_rows else [table]
     if len(parts) > LONGEST_ROW_GROUPS:
         parts = [table]
@@ -131,7 +131,7 @@ def why(error: OSError) -> str:
     return _WHY.get(error.errno or 0, f"{error.strerror or error}; see to the disk and run it again")
 
 
-def write_beside(path: Any, write: Callable[[IO[bytes]], None]) -> None:  # noqa: ANN401 - pathlib or universal path
+def write_beside(path: Any, write: Callable[[IO[bytes]], object]) -> None:  # noqa: ANN401 - pathlib or universal path
     """Write a file beside its place and rename it, so that there is never half of one.
 
     Raises

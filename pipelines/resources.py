@@ -3,7 +3,9 @@
 The only place that reads the environment.
 """
 
+import json
 import os
+from dataclasses import asdict
 from pathlib import Path
 
 from upath import UPath
@@ -11,9 +13,10 @@ from upath import UPath
 from assets import sources
 from assets.formats.settings import read_settings
 from assets.formats.tree import HashCache
-from assets.sources import Song, Sources
-from pipelines.lake import Lake
-from schemas.settings import Brief, Settings
+from assets.sources import Request, Song, Sources
+from kernels.graph.distance import PairDistance
+from pipelines.lake import Lake, write_beside
+from schemas.settings import Brief, OpenClSettings, Settings
 
 
 class StudioError(Exception):
@@ -49,6 +52,22 @@ class StudioFolder:
         """Place of a source on disk."""
         return self.root / path
 
+    def requests(self) -> dict[str, Request]:
+        """List what was asked of dances, by ``<song>|<method>``."""
+        folder = self.root / "lake" / "request"
+        found = {}
+        for path in sorted(folder.glob("*.json")) if folder.is_dir() else []:
+            try:
+                found[path.stem] = Request(**json.loads(path.read_text()))
+            except (ValueError, TypeError, OSError):
+                continue  # not ours, or of another version: as if nobody had asked
+        return found
+
+    def remember(self, key: str, request: Request) -> None:
+        """Keep what was asked of a dance."""
+        text = json.dumps(asdict(request), sort_keys=True)
+        write_beside(self.root / "lake" / "request" / f"{key}.json", lambda file: file.write(text.encode()))
+
     @property
     def dances(self) -> Path:
         """Folder of the finished stages."""
@@ -68,3 +87,13 @@ class NoProgress:
 
     def step(self) -> None:
         """One more is done."""
+
+
+def pair_distance(settings: OpenClSettings) -> PairDistance:
+    """Build the pose distance on the device the settings name; OpenCL is loaded here, not with the module."""
+    import pyopencl as cl
+
+    from kernels.opencl.device import pick_device
+    from kernels.opencl.pose_distance import PoseDistance
+
+    return PoseDistance(cl.Context([pick_device(settings.device)]))

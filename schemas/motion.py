@@ -45,7 +45,12 @@ SKELETON = Table(
         Column("joint_name", pa.string(), "Name in the source file."),
         Column("parent_index", pa.int32(), "Joint index of the parent; -1 for the root."),
         Column("offset_xyz_m", f.VECTOR, "Rest position in the parent's frame."),
-        Column("canonical_joint", pa.string(), "Canonical joint it drives; null when none.", is_optional=True),
+        Column(
+            "canonical_joint",
+            pa.string(),
+            "Canonical joints it drives, joined by commas; null: none.",
+            is_optional=True,
+        ),
     ),
 )
 
@@ -89,7 +94,9 @@ MOTION_BEAT = Table(
         f.TIME_S,
         f.CONFIDENCE_RATIO,
         Column("interval_s", pa.float32(), "Beat interval of the clip."),
-        Column("component_share_ratio", pa.float32(), "Share of the clip's variance that the beat's component carries."),
+        Column(
+            "component_share_ratio", pa.float32(), "Share of the clip's variance that the beat's component carries."
+        ),
         Column("peak_share_ratio", pa.float32(), "Share of the beat curve's spectrum inside its peak."),
     ),
 )

@@ -64,6 +64,5 @@ MUSIC_LOUDNESS = Table(
         f.SONG_ID,
         f.TIME_S,
         Column("loudness_db", pa.float32(), "Short-time A-weighted level relative to full scale."),
-        Column("onset_score", pa.float32(), "Onset activation, 0 to 1."),
     ),
 )

@@ -30,6 +30,7 @@ class MotionBeatSettings:
 
     method: str = key("fft", "'fft', as the document has it, or 'autocorrelation'.")
     component: int = key(1, "Principal component that carries the beat, from 1.")
+    frame: str = key("body", "'body': joints seen from where the dancer faces; 'world': as the document has it.")
     joints: tuple[str, ...] = key((), "Canonical joints whose movement counts; empty for all.")
     extrema_per_beat: int = key(0, "1: every turn is a beat; 2: every second; 0: decided by rule.")
 

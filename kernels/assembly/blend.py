@@ -154,9 +154,8 @@ def assemble(
         seam_s, next_seam_s = steps.song_start_s[a], steps.song_end_s[b - 1]
         before = half[a]
         after = half[b] if b < len(half) else 0.0
-        span = np.flatnonzero((time_s >= seam_s - before) & (time_s < next_seam_s + after))
-        if b == len(half):
-            span = np.flatnonzero(time_s >= seam_s - before)
+        is_here = (time_s >= seam_s - before) | (a == 0)
+        span = np.flatnonzero(is_here & ((time_s < next_seam_s + after) | (b == len(half))))
         # One more sample at each seam: where this phrase takes over, and where it hands over.
         edges = np.array([motion.motion_s[a], motion.motion_s[b]])
         clip_s = steps.clip_start_s[a] + np.append(motion_s[span], edges) - motion.motion_s[a]

@@ -26,7 +26,7 @@ def cover(beat_s: Float, duration_s: float, *, gap_ratio: float = 1.6) -> tuple[
     Returns
     -------
     grid_s : (K + 1,) float64, seconds, strictly increasing
-        The first is at or before 0, the last at or after ``duration_s``.
+        The first is at or before 0 (or a beat at most a nanosecond after it), the last at or after ``duration_s``.
     is_beat : (K + 1,) bool
         True for the beats given, False for those added.
 
@@ -50,6 +50,8 @@ def cover(beat_s: Float, duration_s: float, *, gap_ratio: float = 1.6) -> tuple[
     grid = np.concatenate(
         [beat[0] - first * np.arange(n_before, 0, -1), *inner, beat[-1:], beat[-1] + last * np.arange(1, n_after + 1)]
     )
+    # Rounding must not leave the first sample outside, nor the last.
+    grid[0], grid[-1] = min(grid[0], 0.0) if n_before else grid[0], max(grid[-1], duration_s) if n_after else grid[-1]
     return grid, np.isin(grid, beat)
 
 

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy import signal
 
+from kernels import rotation
 from kernels.types import Float, Int
 
 Method = Literal["fft", "autocorrelation"]
@@ -306,7 +307,9 @@ def _bend_by_parity(curve: Float, frame_rate_hz: float, first_s: float, interval
     return float(np.median(bend[even])), float(np.median(bend[odd]))
 
 
-def motion_beats(position_m: Float, frame_rate_hz: float, *, settings: BeatSettings | None = None) -> MotionBeats:
+def motion_beats(
+    position_m: Float, frame_rate_hz: float, *, heading_rad: Float | None = None, settings: BeatSettings | None = None
+) -> MotionBeats:
     """Find the beats of a clip.
 
     After JP5778523B2, "motion beats", equations 3 to 16; see the module docstring for what is ours.
@@ -315,6 +318,10 @@ def motion_beats(position_m: Float, frame_rate_hz: float, *, settings: BeatSetti
     ----------
     position_m : (F, J, 3) float, metres, world; joint 0 is the root
     frame_rate_hz : float, > 0
+    heading_rad : (F,) float, radians, or None
+        Where the body faces (:func:`kernels.rotation.heading_rad`). Where it is given, the joints are looked at from
+        the body: a dancer who turns is then not taken for one whose every joint swings (ours). None is the document's
+        way, joints relative to the root in the world's axes.
     settings : BeatSettings, or None for the defaults
 
     Returns
@@ -325,8 +332,7 @@ def motion_beats(position_m: Float, frame_rate_hz: float, *, settings: BeatSetti
     Raises
     ------
     ValueError
-        If the shape is not (F, J, 3) with J >= 1, a value is not finite, the rate is not > 0, or a joint of the subset
-        is not there.
+        If a shape does not fit, a value is not finite, the rate is not > 0, or a joint of the subset is not there.
 
     Notes
     -----
@@ -342,8 +348,13 @@ def motion_beats(position_m: Float, frame_rate_hz: float, *, settings: BeatSetti
     f, j, _ = position_m.shape
     if any(not 0 <= k < j for k in settings.joints):
         raise ValueError(f"joints: want 0 to {j - 1}, got {settings.joints}")
+    if heading_rad is not None and heading_rad.shape != (f,):
+        raise ValueError(f"heading_rad: want ({f},), got {heading_rad.shape}")
     chosen = list(settings.joints) or list(range(1, j)) or [0]
-    relative = (position_m[:, chosen] - position_m[:, :1]).reshape(f, -1) if j > 1 else position_m.reshape(f, -1)
+    joint_m = position_m[:, chosen] - position_m[:, :1] if j > 1 else position_m
+    if heading_rad is not None:
+        joint_m = rotation.apply(rotation.from_heading(-heading_rad)[:, None], joint_m)
+    relative = joint_m.reshape(f, -1)
     nothing = MotionBeats(np.zeros(0), 0.0, 0.0, 0.0, np.zeros(0), np.zeros(f))
     if f < 5:
         return nothing

@@ -1,0 +1,98 @@
+"""What is danced when: the methods, each writing the same table."""
+
+from dataclasses import replace
+
+import dagster as dg
+import pyarrow as pa
+
+from assets import tables
+from assets.declare import table_asset
+from assets.lineage import Part, Progress
+from assets.partitions import DANCE, lake_key
+from assets.sources import Studio
+from kernels.assembly.timing import blend_widths, cover, trim
+from kernels.graph.costs import PathCosts
+from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
+from kernels.types import Choreography, Float, Int, MotionGraph
+from schemas.choreography import CHOREOGRAPHY
+from schemas.settings import DanceSettings, PathSettings
+
+
+@table_asset(
+    CHOREOGRAPHY,
+    group="dance",
+    code_version="1",
+    settings="path dance",
+    partitions=DANCE,
+)
+def choreography(
+    context: dg.AssetExecutionContext,
+    motion_graph_node: pa.Table,
+    motion_graph_edge: pa.Table,
+    music_beat: pa.Table,
+    song: pa.Table,
+    studio: dg.ResourceParam[Studio],
+    progress: dg.ResourceParam[Progress],
+) -> Part:
+    """Find the best way through the motion graph for a song."""
+    progress.begin("choosing the steps", 1)
+    key = lake_key(context.partition_key)
+    song_id, method = key.split("|")
+    grid = tables.to_music_beat(music_beat)
+    if len(grid.time_s) < 2:
+        reason = "; ".join(filter(None, song["reason"].to_pylist())) or "it has no beats"
+        raise dg.Failure(f"{song_id}: cannot be danced: {reason}", allow_retries=False)
+    duration_s = float(max(song["duration_s"].to_pylist()))
+    settings = studio.settings()
+    graph, clip_ids = tables.to_motion_graph(motion_graph_node, motion_graph_edge)
+    beat_s, _ = cover(grid.time_s, duration_s)
+    path, begins = search(graph, beat_s, settings.path)
+    steps, kept = chosen_steps(path, graph, beat_s, clip_ids, duration_s, settings.dance)
+    costs = {
+        "transition_cost": path.transition_cost[kept],
+        "warp_cost": path.warp_cost[kept] + path.stride_cost[kept],
+        "repetition_cost": path.repetition_cost[kept],
+    }
+    progress.step()
+    return Part(
+        key,
+        tables.from_choreography(song_id, method, steps, costs),
+        metadata={
+            "cost": path.total_cost,
+            "seams": int(steps.has_seam.sum()),
+            "clips": len(set(steps.clip_id)),
+            "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
+            "begins_at": begins,
+        },
+    )
+
+
+def search(graph: MotionGraph, beat_s: Float, settings: PathSettings) -> tuple[Path, str]:
+    """Find the path from the first beat of a clip, or where none leads to the end, from any beat."""
+    usual = PathCosts()
+    costs = replace(
+        usual,
+        transition=usual.transition * settings.transition_weight,
+        warp=usual.warp * settings.warp_weight,
+        usage=usual.usage * settings.repetition_weight,
+        jump_back=usual.jump_back * settings.repetition_weight,
+    )
+    try:
+        return find_path(graph, beat_s, costs=costs), "the first beat of a clip"
+    except InfeasiblePathError as error:
+        if error.reason == "no_nodes":
+            raise dg.Failure(f"no clip can be danced: {error}", allow_retries=False) from error
+    try:
+        return find_path(graph, beat_s, costs=costs, starts="any"), "any beat"
+    except InfeasiblePathError as error:
+        raise dg.Failure(str(error), allow_retries=False) from error
+
+
+def chosen_steps(
+    path: Path, graph: MotionGraph, beat_s: Float, clip_ids: tuple[str, ...], duration_s: float, settings: DanceSettings
+) -> tuple[Choreography, Int]:
+    """Cut the path to the song and give its seams their blends; the steps, and which of the path's they are."""
+    steps = to_choreography(path, graph, beat_s=beat_s, clip_ids=clip_ids, blend_s=settings.blend_s)
+    steps, kept = trim(steps, duration_s)
+    width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.blend_s)
+    return replace(steps, blend_s=width), kept

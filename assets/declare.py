@@ -1,0 +1,111 @@
+"""Assets that store declared tables: name, meaning, columns and versions said once, for every asset alike."""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import dagster as dg
+
+from schemas.table import Table
+
+# Backfill policies are beta in the Dagster this is pinned to; its warning would stand in front of every command.
+warnings.filterwarnings("ignore", category=dg.BetaWarning)
+
+# Where freshness reads what an asset depends on besides its inputs.
+SETTINGS_KEY = "odori/settings"
+SOURCES_KEY = "odori/sources"
+
+
+def table_asset(
+    table: Table,
+    *,
+    group: str,
+    code_version: str,
+    settings: str = "",
+    sources: str = "",
+    partitions: dg.PartitionsDefinition[str] | None = None,
+    ins: Mapping[str, dg.AssetIn] | None = None,
+    checks: Mapping[str, str] | None = None,
+    io_manager: str = "lake",
+) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
+    """Declare an asset that stores a table of its own name.
+
+    Parameters
+    ----------
+    table : the declaration
+    group : area of the asset graph
+    code_version : raised by hand when the meaning of the output changes
+    settings : sections of ``odori.toml`` it reads, separated by spaces
+    sources : "clips", "song" or "request" when it reads source files of its partition
+    partitions : how it is cut; many sessions or songs are made in one run
+    ins : inputs whose partitions do not match its own
+    checks : asset checks it yields, by name, each with what it believes
+    io_manager : who stores it
+    """
+    made: Callable[[Callable[..., Any]], dg.AssetsDefinition] = dg.asset(
+        name=table.name,
+        group_name=group,
+        code_version=code_version,
+        description=table.meaning,
+        metadata=_metadata(table, settings, sources),
+        io_manager_key=io_manager,
+        partitions_def=partitions,
+        backfill_policy=_backfill(partitions),
+        ins=ins or {},
+        check_specs=[dg.AssetCheckSpec(n, asset=table.name, description=w) for n, w in (checks or {}).items()],
+    )
+    return made
+
+
+def table_assets(
+    name: str,
+    tables: Sequence[Table],
+    *,
+    group: str,
+    code_version: str,
+    settings: str = "",
+    sources: str = "",
+    partitions: dg.PartitionsDefinition[str] | None = None,
+    ins: Mapping[str, dg.AssetIn] | None = None,
+    checks: Mapping[str, tuple[Table, str]] | None = None,
+) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
+    """Declare assets made in one pass, stored in the order of ``tables``; arguments as :func:`table_asset`.
+
+    ``checks`` name the table they are about.
+    """
+    made: Callable[[Callable[..., Any]], dg.AssetsDefinition] = dg.multi_asset(
+        name=name,
+        outs={
+            table.name: dg.AssetOut(
+                group_name=group,
+                code_version=code_version,
+                description=table.meaning,
+                metadata=_metadata(table, settings, sources),
+                io_manager_key="lake",
+            )
+            for table in tables
+        },
+        partitions_def=partitions,
+        backfill_policy=_backfill(partitions),
+        ins=ins or {},
+        check_specs=[dg.AssetCheckSpec(n, asset=t.name, description=w) for n, (t, w) in (checks or {}).items()],
+    )
+    return made
+
+
+def _backfill(partitions: dg.PartitionsDefinition[str] | None) -> dg.BackfillPolicy | None:
+    return dg.BackfillPolicy.single_run() if isinstance(partitions, dg.DynamicPartitionsDefinition) else None
+
+
+def _metadata(table: Table, settings: str, sources: str) -> dict[str, Any]:
+    return {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
+
+
+def column_schema(table: Table) -> dg.TableSchema:
+    """Columns of a table as Dagster's UI shows them."""
+    columns = []
+    for column in table.columns:
+        meaning = f"{column.meaning} [{column.unit}]" if column.unit else column.meaning
+        constraints = dg.TableColumnConstraints(nullable=column.is_optional, unique=table.key == (column.name,))
+        columns.append(dg.TableColumn(column.name, str(column.type), meaning, constraints))
+    return dg.TableSchema(columns)

@@ -1,0 +1,151 @@
+"""The motion graph: which beat of which clip may follow which."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import dagster as dg
+import numpy as np
+
+from assets import plots, tables
+from assets.declare import table_assets
+from assets.lineage import Part, Progress, Stored
+from assets.partitions import EVERY
+from assets.sources import Studio
+from kernels import rotation
+from kernels.graph.distance import PairDistance, concatenate
+from kernels.graph.features import BeatFeatures, beat_features
+from kernels.graph.nodes import beat_nodes
+from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
+from kernels.graph.transitions import THRESHOLD, Transitions, find_transitions
+from kernels.skeleton.canonical import JOINTS
+from kernels.types import Float, MotionGraph
+from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
+from schemas.settings import MotionGraphSettings
+
+PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
+    "reach": keep_endless,
+    "dead_ends": remove_dead_ends,
+    "component": keep_strongest,
+    "none": keep_all,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Beats:
+    """The beats of one clip as the graph takes them."""
+
+    clip_id: str
+    label: str
+    duration_s: float
+    time_s: Float
+    features: BeatFeatures
+
+
+@table_assets(
+    "motion_graph",
+    (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
+    group="catalog",
+    code_version="1",
+    settings="motion_graph",
+    ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
+    checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
+)
+def motion_graph(
+    clip: Stored,
+    canonical_pose: Stored,
+    motion_beat: Stored,
+    studio: dg.ResourceParam[Studio],
+    pair_distance: dg.ResourceParam[PairDistance],
+    progress: dg.ResourceParam[Progress],
+) -> Iterator[dg.Output[Part] | dg.AssetCheckResult]:
+    """Join the beats of all clips where one pose may follow another."""
+    settings = studio.settings().motion_graph
+    progress.begin("motion graph", len(motion_beat.keys))
+    beats = [
+        b for key in motion_beat.keys for b in _session(key, clip, canonical_pose, motion_beat, settings, progress)
+    ]
+    nodes = beat_nodes([b.time_s for b in beats], [b.duration_s for b in beats])
+    found = find_transitions(
+        _together(beats, settings),
+        nodes,
+        distance=pair_distance,
+        threshold=settings.threshold or THRESHOLD,
+        n_nearest=settings.neighbours,
+    )
+    losses = {name: prune(found.graph) for name, prune in PRUNE.items()}
+    kept = losses[settings.prune]
+    index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
+    ids, labels = [b.clip_id for b in beats], [b.label for b in beats]
+    node = tables.from_motion_graph_node(found.graph, ids, index, labels, kept.is_kept)
+    edge = tables.from_motion_graph_edge(found.graph, ids, found.distance)
+    yield dg.Output(Part("", node, metadata=_metadata(found, losses, settings.prune)), MOTION_GRAPH_NODE.name)
+    yield dg.Output(Part("", edge), MOTION_GRAPH_EDGE.name)
+    yield dg.AssetCheckResult(
+        check_name="goes_on",
+        asset_key=MOTION_GRAPH_NODE.name,
+        passed=found.is_endless,
+        severity=dg.AssetCheckSeverity.WARN,
+        metadata={"beats": len(nodes), "threshold_used": found.threshold_used},
+    )
+
+
+def _session(
+    key: str,
+    clip: Stored,
+    canonical_pose: Stored,
+    motion_beat: Stored,
+    settings: MotionGraphSettings,
+    progress: Progress,
+) -> list[Beats]:
+    """Take the beats of one session's clips with their features."""
+    labels = dict(zip(*(clip.read(key)[c].to_pylist() for c in ("clip_id", "label")), strict=True))
+    beats = tables.by_clip(motion_beat.read(key))
+    poses = tables.by_clip(canonical_pose.read(key, clip_ids=beats)) if beats else {}
+    found = []
+    for clip_id, rows in beats.items():
+        moved = tables.to_canonical_pose(poses[clip_id])
+        time_s = np.minimum(tables.to_numbers(rows["time_s"]), moved.duration_s)
+        features = beat_features(
+            moved.rotation_wxyz,
+            moved.position_xyz_m,
+            frame_rate_hz=moved.frame_rate_hz,
+            time_s=time_s,
+            metric=settings.metric,  # type: ignore[arg-type]
+        )
+        found.append(Beats(clip_id, labels[clip_id], moved.duration_s, time_s, features))
+    progress.step()
+    return found
+
+
+def _together(beats: list[Beats], settings: MotionGraphSettings) -> BeatFeatures:
+    """Stack the features of all clips; of no beat when there is no clip."""
+    parts = [b.features for b in beats] or [
+        beat_features(
+            np.tile(rotation.IDENTITY, (1, len(JOINTS), 1)),
+            np.zeros((1, len(JOINTS), 3)),
+            frame_rate_hz=1.0,
+            time_s=np.zeros(0),
+            metric=settings.metric,  # type: ignore[arg-type]
+        )
+    ]
+    return BeatFeatures(concatenate([p.pose for p in parts]), np.concatenate([p.local_distance for p in parts]))
+
+
+def _metadata(found: Transitions, losses: dict[str, Pruned], chosen: str) -> dict[str, object]:
+    degree = np.bincount(found.graph.source, minlength=len(found.graph.time_s)).astype(np.float64)
+    picture = plots.motion_graph(found.graph.weight, found.threshold_used, degree)
+    loss = plots.markdown(
+        ("pruning", "beats lost", "clips lost", "seconds lost", "of", "used"),
+        [
+            (name, p.n_nodes_lost, p.n_clips_lost, p.lost_s, p.total_s, "yes" if name == chosen else "")
+            for name, p in losses.items()
+            if name != "none"
+        ],
+    )
+    return {
+        "transitions": len(found.graph.source),
+        "threshold_asked": found.threshold_asked,
+        "threshold_used": found.threshold_used,
+        "removed_for_missing_frames": found.n_margin_removed,
+        "catalogue_loss": dg.MetadataValue.md(f"{picture}\n\n{loss}"),
+    }

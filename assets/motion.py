@@ -1,0 +1,105 @@
+"""From poses to canonical poses and motion beats, session by session and clip by clip."""
+
+from collections.abc import Iterator
+
+import dagster as dg
+import pyarrow as pa
+
+from assets import plots, tables
+from assets.declare import table_asset
+from assets.lineage import (
+    Earlier,
+    Part,
+    Parts,
+    Progress,
+    Stored,
+    clip_versions,
+    code_version,
+    per_clip,
+    version_of,
+)
+from assets.partitions import SESSION
+from assets.sources import Studio
+from kernels import rotation
+from kernels.motion.beats import BeatSettings, motion_beats
+from kernels.skeleton.canonical import CANONICAL
+from kernels.skeleton.retarget import retarget
+from schemas.motion import CANONICAL_POSE, MOTION_BEAT
+from schemas.settings import MotionBeatSettings
+
+
+@table_asset(CANONICAL_POSE, group="motion", code_version="1", partitions=SESSION)
+def canonical_pose(
+    context: dg.AssetExecutionContext,
+    pose: Stored,
+    skeleton: Stored,
+    earlier: dg.ResourceParam[Earlier],
+    progress: dg.ResourceParam[Progress],
+) -> Parts:
+    """Bring every clip to the canonical skeleton."""
+    code = code_version(context, CANONICAL_POSE.name)
+
+    def session(key: str) -> Part:
+        made_from = {
+            clip: version_of(version, skeleton.stamp(key).clips[clip].content)
+            for clip, version in clip_versions(pose, key, code).items()
+        }
+        poses, skeletons = tables.by_clip(pose.read(key)), tables.by_clip(skeleton.read(key))
+
+        def one(clip: str) -> pa.Table:
+            if clip not in poses:
+                return CANONICAL_POSE.empty()
+            rig, mapping = tables.to_skeleton(skeletons[clip])
+            moved = tables.to_pose(poses[clip], rig)
+            return tables.from_canonical_pose(clip, moved.frame_rate_hz, retarget(moved, mapping))
+
+        return per_clip(CANONICAL_POSE, key, made_from, one, earlier=earlier, progress=progress)
+
+    return Parts(session(key) for key in _begun(progress, "canonical poses", pose))
+
+
+@table_asset(MOTION_BEAT, group="motion", code_version="1", settings="motion_beat", partitions=SESSION)
+def motion_beat(
+    context: dg.AssetExecutionContext,
+    canonical_pose: Stored,
+    clip: Stored,
+    studio: dg.ResourceParam[Studio],
+    earlier: dg.ResourceParam[Earlier],
+    progress: dg.ResourceParam[Progress],
+) -> Parts:
+    """Find the beats of every clip by windowed principal components."""
+    settings = studio.settings().motion_beat
+    code = version_of(code_version(context, MOTION_BEAT.name), repr(settings))
+    how = beat_settings(settings)
+
+    def session(key: str) -> Part:
+        poses = tables.by_clip(canonical_pose.read(key))
+
+        def one(clip_id: str) -> pa.Table:
+            if clip_id not in poses:
+                return MOTION_BEAT.empty()
+            moved = tables.to_canonical_pose(poses[clip_id])
+            heading = rotation.heading_rad(moved.rotation_wxyz[:, 0]) if settings.frame == "body" else None
+            beats = motion_beats(moved.position_xyz_m, moved.frame_rate_hz, heading_rad=heading, settings=how)
+            return tables.from_motion_beat(clip_id, beats, moved.frame_rate_hz)
+
+        part = per_clip(
+            MOTION_BEAT, key, clip_versions(canonical_pose, key, code), one, earlier=earlier, progress=progress
+        )
+        picture = plots.session_beats(part.table, clip.read(key))
+        return Part(
+            part.key, part.table, clips=part.clips, metadata={**part.metadata, "beats": dg.MetadataValue.md(picture)}
+        )
+
+    return Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose))
+
+
+def beat_settings(settings: MotionBeatSettings) -> BeatSettings:
+    """Turn the names of ``odori.toml`` into what the kernel takes; ValueError for a joint that is none."""
+    joints = tuple(CANONICAL.index(name) for name in settings.joints)
+    return BeatSettings(settings.component, joints, settings.method, settings.extrema_per_beat)  # type: ignore[arg-type]
+
+
+def _begun(progress: Progress, what: str, upstream: Stored) -> Iterator[str]:
+    progress.begin(what, sum(len(upstream.stamp(key).clips) for key in upstream.keys))
+    yield from upstream.keys

@@ -1,0 +1,184 @@
+"""From the files under ``songs/`` to songs, beats, tempo candidates and loudness."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import dagster as dg
+import numpy as np
+
+from assets import plots, tables
+from assets.declare import table_assets
+from assets.formats import audio, beats_file, midi
+from assets.formats.errors import FormatError
+from assets.lineage import Part, Parts, Progress, version_of
+from assets.partitions import SONG, lake_key
+from assets.sources import Song, Studio, brief_version, song_version
+from kernels.music.beats import BeatAnalysis, TempoCandidate, track_beats
+from kernels.music.intensity import loudness_db
+from kernels.music.level import change_level, nudge
+from kernels.music.preview import render_preview
+from kernels.types import BeatGrid, Float
+from schemas import music as schema
+from schemas.settings import BeatsBrief, Settings
+
+_TABLES = (schema.SONG, schema.MUSIC_BEAT, schema.MUSIC_TEMPO, schema.MUSIC_LOUDNESS)
+
+
+@table_assets(
+    "music",
+    _TABLES,
+    group="music",
+    code_version="1",
+    settings="music_beat limits",
+    sources="song",
+    partitions=SONG,
+    checks={"beats_found": (schema.MUSIC_BEAT, "Every song read has beats to dance to.")},
+)
+def music(
+    context: dg.AssetExecutionContext, studio: dg.ResourceParam[Studio], progress: dg.ResourceParam[Progress]
+) -> Iterator[dg.Output[Parts] | dg.AssetCheckResult]:
+    """Read every song, or refuse it with a reason, and find its beats."""
+    songs = studio.sources().songs_by_key()
+    keys = [lake_key(key) for key in context.partition_keys]
+    progress.begin("listening to songs", len(keys))
+    made: list[dict[str, Part]] = []
+    for key in keys:
+        made.append(_parts(key, songs.get(key, ()), studio))
+        progress.step()
+    for table in _TABLES:
+        yield dg.Output(Parts([parts[table.name] for parts in made]), table.name)
+    silent = [parts[schema.SONG.name].key for parts in made if not parts[schema.MUSIC_BEAT.name].table.num_rows]
+    yield dg.AssetCheckResult(
+        check_name="beats_found",
+        asset_key=schema.MUSIC_BEAT.name,
+        passed=not silent,
+        severity=dg.AssetCheckSeverity.WARN,
+        metadata={"songs_without_beats": ", ".join(silent) or "none"},
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """What a song is: its length and shape, its beats, its loudness."""
+
+    duration_s: float
+    sample_rate_hz: int
+    n_channels: int
+    analysis: BeatAnalysis
+    time_s: Float
+    loudness_db: Float
+
+
+def listen(song: Song, studio: Studio, settings: Settings) -> Heard:
+    """Read a song and find its beats, as its brief wants them.
+
+    Raises
+    ------
+    FormatError
+        If the song, its brief or its beats file cannot be read.
+    """
+    place = studio.file(song.path)
+    if song.kind == "midi":
+        read = midi.read(place)
+        sound, rate_hz, n_channels = render_preview(read.notes), PREVIEW_RATE_HZ, 0
+        duration_s = len(sound) / rate_hz
+        analysis = BeatAnalysis(read.beats, _level_of(read.beats))
+    else:
+        decoded = audio.read(place, limit_s=settings.limits.longest_song_s)
+        sound, rate_hz, n_channels = decoded.samples, decoded.sample_rate_hz, decoded.samples.shape[1]
+        duration_s = decoded.duration_s
+        analysis = track_beats(sound, rate_hz)
+    time_s, level_db = loudness_db(sound, rate_hz, frame_rate_hz=LOUDNESS_RATE_HZ)
+    analysis = _as_briefed(analysis, studio.brief(song).beats, studio, song)
+    return Heard(duration_s, 0 if song.kind == "midi" else rate_hz, n_channels, analysis, time_s, level_db)
+
+
+PREVIEW_RATE_HZ = 44100
+LOUDNESS_RATE_HZ = 20.0
+
+
+def _as_briefed(analysis: BeatAnalysis, brief: BeatsBrief, studio: Studio, song: Song) -> BeatAnalysis:
+    if brief.file:
+        grid = beats_file.read(studio.file(song.brief).parent / brief.file)
+        analysis = BeatAnalysis(grid, _level_of(grid))
+    grid = change_level(analysis.grid, brief.octave) if brief.octave != 1 else analysis.grid
+    if brief.nudge_beats or brief.nudge_ms:
+        grid = nudge(grid, beats=brief.nudge_beats, seconds=brief.nudge_ms / 1000)
+    candidates = tuple(
+        replace(c, level_ratio=c.level_ratio / brief.octave, is_chosen=bool(np.isclose(c.level_ratio, brief.octave)))
+        for c in analysis.tempo_candidates
+    )
+    return BeatAnalysis(grid, candidates)
+
+
+def _level_of(grid: BeatGrid) -> tuple[TempoCandidate, ...]:
+    """Make the only candidate of beats that were told, not found."""
+    if len(grid.time_s) < 2:
+        return ()
+    return (TempoCandidate(1.0, 60 / float(np.median(np.diff(grid.time_s))), 1.0, True),)
+
+
+def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
+    """Make the tables of one song; a refused one gets its row and no beats."""
+    version = version_of(song_version(songs), brief_version(studio, songs))
+    parts = {table.name: Part(key, table.empty(), version) for table in _TABLES}
+    rows = []
+    for song in songs:
+        reason, heard = song.problem, None
+        if not reason:
+            try:
+                heard = listen(song, studio, studio.settings())
+                reason = _undanceable(heard)
+            except (FormatError, OSError) as error:
+                reason = getattr(error, "what", "") or str(error)
+        rows.append(_row(song, heard, reason))
+        if heard is not None and not reason:
+            parts |= _heard_parts(key, heard, version)
+    refused = [f"{r['path']}: {r['reason']}" for r in rows if r["reason"]]
+    parts[schema.SONG.name] = Part(
+        key, tables.from_rows(schema.SONG, rows), version, metadata={"refusals": "; ".join(refused) or "none"}
+    )
+    return parts
+
+
+def _heard_parts(key: str, heard: Heard, version: str) -> dict[str, Part]:
+    grid, candidates = heard.analysis.grid, heard.analysis.tempo_candidates
+    picture = plots.song_beats(grid, heard.time_s, heard.loudness_db)
+    levels = plots.markdown(
+        ("level", "beats/min", "score", "chosen"),
+        [(c.level_ratio, c.tempo_bpm, c.score, "yes" if c.is_chosen else "") for c in candidates],
+    )
+    made = {
+        schema.MUSIC_BEAT.name: (tables.from_music_beat(key, grid), {"beats": dg.MetadataValue.md(picture)}),
+        schema.MUSIC_TEMPO.name: (tables.from_music_tempo(key, candidates), {"levels": dg.MetadataValue.md(levels)}),
+        schema.MUSIC_LOUDNESS.name: (tables.from_music_loudness(key, heard.time_s, heard.loudness_db), {}),
+    }
+    return {name: Part(key, table, version, metadata=metadata) for name, (table, metadata) in made.items()}
+
+
+def _undanceable(heard: Heard) -> str:
+    n = len(heard.analysis.grid.time_s)
+    if n >= 2:
+        return ""
+    quiet = len(heard.loudness_db) == 0 or float(heard.loudness_db.max()) < SILENCE_DB
+    why = "the song is silent" if quiet else f"{heard.duration_s:.1f} s gave {n}"
+    return f"want at least two beats to dance to, {why}; name a beats file in its brief"
+
+
+SILENCE_DB = -60.0
+
+
+def _row(song: Song, heard: Heard | None, reason: str) -> dict[str, object]:
+    beats = heard.analysis.grid.time_s if heard and not reason else np.zeros(0)
+    return {
+        "song_id": song.key,
+        "path": song.path.encode("utf-8", "backslashreplace").decode(),
+        "source_sha256": song.sha256,
+        "kind": song.kind,
+        "duration_s": heard.duration_s if heard and not reason else 0.0,
+        "sample_rate_hz": heard.sample_rate_hz if heard else 0,
+        "channel_count": heard.n_channels if heard else 0,
+        "tempo_bpm": 60 / float(np.median(np.diff(beats))) if len(beats) > 1 else 0.0,
+        "state": "refused" if reason else "read",
+        "reason": reason or None,
+    }

@@ -1,0 +1,195 @@
+"""The `odori` command: a convenience over the same jobs Dagster runs.
+
+Each command prints a short report, or with ``--json`` exactly one object on standard output; logs and progress go to
+standard error. Exit status: 0 done, 1 done but some inputs were refused, 2 nothing done.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from assets.formats.errors import FormatError
+from pipelines.lake import LakeError
+from pipelines.resources import StudioError
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Keep a motion-capture catalogue analysed and ready to dance; make a song a dance in USD.",
+    pretty_exceptions_enable=False,
+)
+DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
+TROUBLE = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
+
+StudioOption = Annotated[
+    Path | None,
+    typer.Option("--studio", help="The studio folder; else $ODORI_STUDIO, else ./studio.", show_default=False),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the report.")]
+
+
+@app.command()
+def demo(
+    studio: Annotated[Path, typer.Option("--studio", help="Folder for the made-up studio.")] = Path("demo"),
+    as_json: JsonOption = False,
+) -> None:
+    """Make up a studio, run the whole pipeline and dance its song: no input needed.
+
+    Example: odori demo
+    """
+    from pipelines import demo_studio
+
+    with _Trouble(as_json):
+        demo_studio.make(studio)
+        _say(f"a made-up studio is in {studio}", as_json)
+    _dance(studio, [demo_studio.SONG], "graph", None, None, as_json)
+
+
+@app.command()
+def build(
+    studio: StudioOption = None,
+    dances: Annotated[bool, typer.Option("--dances", help="Also dance every song again whose dance is stale.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Bring everything up to date: only what changed is computed.
+
+    Examples: odori build · odori build --studio /shows/nagoya --dances
+    """
+    from pipelines import commands
+
+    with _Trouble(as_json):
+        result = commands.build(_folder(studio), dances=dances, progress=_progress())
+        _finish(result, as_json)
+
+
+@app.command()
+def dance(
+    songs: Annotated[
+        list[str], typer.Argument(metavar="SONG...", help="Key or file name of a song; several, or 'all'.")
+    ],
+    studio: StudioOption = None,
+    method: Annotated[str, typer.Option("--method", help="How the steps are chosen: graph.")] = "graph",
+    fps: Annotated[
+        float | None, typer.Option("--fps", help="Frames a second of the stage.", min=1.0, max=240.0)
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Also copy the stage here: a .usdz or .usdc file.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Dance a song: a USD stage with the music in it.
+
+    Examples: odori dance waltz.mp3 · odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance all
+    """
+    _dance(studio, songs, method, fps, out, as_json)
+
+
+def _dance(
+    studio: Path | None, songs: list[str], method: str, fps: float | None, out: Path | None, as_json: bool
+) -> None:
+    from pipelines import commands
+
+    with _Trouble(as_json):
+        result = commands.dance(_folder(studio), songs, method=method, frame_rate_hz=fps, out=out, progress=_progress())
+        _finish(result, as_json)
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(metavar="FILE.usd[cz]", help="The stage to look at.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Validate a stage: USD's own validators, and our contract.
+
+    Example: odori check dances/waltz/graph.usdz
+    """
+    from pipelines import commands
+
+    with _Trouble(as_json):
+        _finish(commands.check(file), as_json)
+
+
+@app.command()
+def status(studio: StudioOption = None, as_json: JsonOption = False) -> None:
+    """Say what is fresh, stale, failed or refused, and why.
+
+    Examples: odori status · odori status --json
+    """
+    from pipelines import commands
+
+    with _Trouble(as_json):
+        _finish(commands.status(_folder(studio)), as_json)
+
+
+@app.command()
+def ui(
+    studio: StudioOption = None,
+    port: Annotated[int, typer.Option("--port", help="Port of the web page.")] = 3000,
+    host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = "127.0.0.1",
+) -> None:
+    """Open Dagster's web UI on this studio, with the sensor and the nightly schedule running.
+
+    Example: odori ui --port 3001
+    """
+    from pipelines import web
+
+    with _Trouble(False):
+        raise typer.Exit(web.serve(_folder(studio), host=host, port=port))
+
+
+def _folder(studio: Path | None) -> Path:
+    return studio or Path(os.environ.get("ODORI_STUDIO", "studio"))
+
+
+def _say(text: str, as_json: bool) -> None:
+    (TROUBLE if as_json else Console(highlight=False, soft_wrap=True, markup=False)).print(text)
+
+
+def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - a commands.Outcome; typed where it is loaded
+    for line in result.troubles:
+        TROUBLE.print(line)
+    if as_json:
+        sys.stdout.write(json.dumps(result.facts, ensure_ascii=False, sort_keys=True) + "\n")
+    elif result.report:
+        _say(result.report, as_json)
+    raise typer.Exit(result.status)
+
+
+class _Trouble:
+    """Turn what the user can mend into one sentence and exit status 2."""
+
+    def __init__(self, as_json: bool) -> None:
+        self._as_json = as_json
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        if isinstance(error, StudioError | LakeError | FormatError | LookupError | OSError):
+            text = error.args[0] if isinstance(error, LookupError) and error.args else str(error)
+            TROUBLE.print(f"odori: {text}")
+            if self._as_json:
+                sys.stdout.write(json.dumps({"error": str(text)}) + "\n")
+            raise typer.Exit(NOTHING_DONE) from error
+
+
+def _progress() -> Callable[[], Any]:
+    """Make a progress bar on standard error, or nothing where that is no terminal."""
+    from pipelines.progress import Bar
+    from pipelines.resources import NoProgress
+
+    return Bar if sys.stderr.isatty() else NoProgress
+
+
+def main() -> None:
+    """Run the command; ``--json`` may stand anywhere, also last."""
+    app()
+
+
+if __name__ == "__main__":
+    main()

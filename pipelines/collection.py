@@ -1,0 +1,20 @@
+"""All assets in one list, and what is fresh of them: asked by definitions, sensor, schedule and command."""
+
+from collections.abc import Sequence
+
+import dagster as dg
+
+from assets import capture, choreography, dance, graph, motion, music
+from pipelines.freshness import Freshness, nodes
+from pipelines.resources import StudioFolder
+
+ASSETS: Sequence[dg.AssetsDefinition] = [
+    asset
+    for asset in dg.load_assets_from_modules([capture, motion, music, graph, choreography, dance])
+    if isinstance(asset, dg.AssetsDefinition)
+]
+
+
+def freshness(studio: StudioFolder) -> Freshness:
+    """States of a studio's assets, by this asset graph."""
+    return Freshness(nodes(ASSETS), studio.lake, studio)

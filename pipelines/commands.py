@@ -1,0 +1,339 @@
+"""What the command does: the report for a person, the facts for a machine, the exit status."""
+
+import difflib
+import json
+import shutil
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from assets.lineage import Progress
+from assets.partitions import METHODS
+from assets.sources import Request, Song
+from pipelines import build as building
+from pipelines.collection import freshness
+from pipelines.definitions import build_definitions
+from pipelines.freshness import Freshness
+from pipelines.lake import write_beside
+from pipelines.resources import StudioError, StudioFolder
+from pipelines.web import existing
+from schemas.music import SONG
+
+DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
+LONGEST_LIST = 40
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command came to.
+
+    Parameters
+    ----------
+    status : exit status
+    facts : what ``--json`` prints
+    report : what a person reads on standard output
+    troubles : refused inputs and failures, one line each, for standard error
+    """
+
+    status: int
+    facts: dict[str, Any]
+    report: str = ""
+    troubles: Sequence[str] = field(default_factory=tuple)
+
+
+class _Session:
+    """A studio opened for work: held, tidied, its definitions loaded."""
+
+    def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
+        self.studio = studio
+        self.state = freshness(studio)
+        self._progress = progress
+
+    def run(self, groups: Iterable[str], *, keys: Callable[[str, str], bool] | None = None) -> building.Report:
+        """Bring groups of assets up to date."""
+        bar: Progress = self._progress()
+        try:
+            with building.exclusive(self.studio):
+                instance = building.open_instance(self.studio)
+                building.clear_after_kill(self.studio, instance)
+                definitions = build_definitions(self.studio, progress=bar)
+                return building.bring_up_to_date(
+                    self.studio, definitions, instance, self.state, groups=groups, keys=keys
+                )
+        finally:
+            if hasattr(bar, "close"):
+                bar.close()
+
+
+def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
+    """Bring a studio up to date."""
+    studio = existing(root)
+    work = _Session(studio, progress)
+    sources = work.state.sources
+    if not sources.clips and not sources.songs:
+        raise StudioError(f"{root}: want clips under clips/ and songs under songs/, got none; put some there")
+    groups = building.GROUPS if dances else [g for g in building.GROUPS if g != "dance"]
+    report = work.run(groups)
+    clips, songs = _clips(work.state, studio), _songs(work.state, studio)
+    refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
+    facts = {
+        "clips": _counts(clips),
+        "songs": _counts(songs),
+        "refused": [{"path": f["path"], "reason": f["reason"]} for f in refused],
+        "ran": [{"assets": list(b.assets), "partitions": list(b.keys)} for b in report.ran],
+        "failed": report.failed,
+        "notes": list(sources.notes),
+    }
+    troubles = [*_refusals(refused), *(f"failed: {f}" for f in report.failed), *(f"note: {n}" for n in sources.notes)]
+    status = (
+        NOTHING_DONE
+        if report.failed and not _any_read(clips, songs)
+        else SOME_REFUSED
+        if refused or report.failed
+        else DONE
+    )
+    return Outcome(status, facts, _build_report(facts, studio), troubles)
+
+
+def _build_report(facts: dict[str, Any], studio: StudioFolder) -> str:
+    clips, songs = facts["clips"], facts["songs"]
+    made = sum(len(batch["partitions"]) for batch in facts["ran"])
+    work = f"{made} partitions made" if made else "everything was up to date"
+    refused = clips["refused"] + songs["refused"]
+    return (
+        f"{clips['read']} clips and {songs['read']} songs read, {refused} files refused; {work}\n"
+        f"next: odori dance SONG --studio {studio.root}, or odori ui --studio {studio.root}"
+    )
+
+
+def dance(
+    root: Path,
+    wanted: Sequence[str],
+    *,
+    method: str,
+    frame_rate_hz: float | None,
+    out: Path | None,
+    progress: Callable[[], Any],
+) -> Outcome:
+    """Dance songs, building first what they need."""
+    studio = existing(root)
+    if method not in METHODS:
+        raise StudioError(f"--method: want one of {', '.join(METHODS)}, got {method!r}")
+    if out is not None and out.suffix not in (".usdz", ".usdc"):
+        raise StudioError(f"--out: want a file ending in .usdz or .usdc, got {out.name!r}")
+    work = _Session(studio, progress)
+    songs = _wanted(work.state, wanted, studio)
+    if out is not None and len(songs) > 1:
+        raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
+    keys = {f"{song.key}|{method}" for song in songs}
+    for key in sorted(keys):
+        studio.remember(key, Request(frame_rate_hz or 0.0))
+    names = {song.key for song in songs}
+    report = work.run(
+        building.GROUPS,
+        keys=lambda kind, key: key in keys if kind == "dance" else key in names if kind == "song" else True,
+    )
+    state = freshness(studio)
+    refused = {f["key"]: f["reason"] for f in _songs(state, studio) if f["state"] == "refused"}
+    made, troubles = [], []
+    for song in songs:
+        found = studio.lake.stamp("usd_animation", f"{song.key}|{method}")
+        if refused.get(song.key):
+            troubles.append(f"refused: {song.path}: {refused[song.key]}")
+        elif found is None or state.state("usd_animation", f"{song.key}|{method}").state != "fresh":
+            troubles += [f"failed: {f}" for f in report.failed] or [f"failed: {song.path}"]
+        else:
+            made.append(_dance_facts(studio, song.key, method))
+    if out is not None and made:
+        _copy(studio, made[0], out)
+    status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
+    facts = _dance_json(made, troubles, len(songs))
+    return Outcome(status, facts, "\n".join(_dance_report(d) for d in made), list(dict.fromkeys(troubles)))
+
+
+def _dance_json(made: list[dict[str, Any]], troubles: list[str], n_asked: int) -> dict[str, Any]:
+    if n_asked == 1:
+        return made[0] if made else {"error": "; ".join(dict.fromkeys(troubles))}
+    return {"dances": made, "troubles": list(dict.fromkeys(troubles))}
+
+
+def _dance_facts(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
+    folder = studio.dances / song
+    report = json.loads((folder / f"{method}.json").read_text())
+    return {
+        "song": song,
+        "method": method,
+        "stage": str(folder / f"{method}.usdc"),
+        "usdz": str(folder / f"{method}.usdz"),
+        "quality": report["quality"],
+        "not_as_wanted": sorted(n for n, m in report["wanted"].items() if m["is_passed"] is False),
+        "pins": [],
+    }
+
+
+def _dance_report(facts: dict[str, Any]) -> str:
+    q = facts["quality"]
+    lines = [
+        f"{facts['song']}: {facts['usdz']}",
+        f"  {q['clip_count']:.0f} clips, {q['seam_count']:.0f} seams; beats at most {q['beat_lag_ms']:.1f} ms off; "
+        f"warp {q['warp_least_ratio']:.2f} to {q['warp_most_ratio']:.2f}",
+        f"  on the beat to an independent eye: F {q['beat_f_ratio']:.2f}, p {q['beat_p_probability']:.3f}",
+    ]
+    if facts["not_as_wanted"]:
+        lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")
+    return "\n".join(lines)
+
+
+def _copy(studio: StudioFolder, facts: dict[str, Any], out: Path) -> None:
+    source = Path(facts["usdz" if out.suffix == ".usdz" else "stage"])
+    write_beside(out, lambda file: shutil.copyfileobj(source.open("rb"), file))
+    facts["out"] = str(out)
+    if out.suffix == ".usdc":  # the stage names its song beside it
+        sound = source.with_name("song.wav")
+        write_beside(out.with_name(sound.name), lambda file: shutil.copyfileobj(sound.open("rb"), file))
+
+
+def _wanted(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[Song]:
+    """Find songs by key, file name, stem or path; LookupError naming the nearest where there is none."""
+    songs = {key: state.sources.song(key) for key in state.sources.songs_by_key()}
+    if not songs:
+        raise StudioError(f"{studio.root}: want a song under songs/, got none; put one there")
+    if list(wanted) == ["all"]:
+        return list(songs.values())
+    found = []
+    for text in wanted:
+        name = Path(text).name
+        hits = [
+            s
+            for s in songs.values()
+            if text in (s.key, s.path)
+            or name == Path(s.path).name
+            or text == Path(s.path).stem
+            or _same(studio, s, text)
+        ]
+        if not hits:
+            near = difflib.get_close_matches(
+                text, [*songs, *(Path(s.path).name for s in songs.values())], n=3, cutoff=0.3
+            )
+            raise StudioError(
+                f"{text}: want a song of this studio, found none of that name; "
+                f"{'near are ' + ', '.join(near) if near else 'there are ' + ', '.join(list(songs)[:10])}"
+            )
+        found.append(hits[0])
+    return list(dict.fromkeys(found))
+
+
+def _same(studio: StudioFolder, song: Song, text: str) -> bool:
+    return Path(text).absolute() == studio.file(song.path)
+
+
+def check(file: Path) -> Outcome:
+    """Validate a stage."""
+    from assets.formats import usd_check
+
+    findings = usd_check.check(file)
+    errors = [f for f in findings if f.severity == "error"]
+    facts = {
+        "file": str(file),
+        "is_valid": not errors,
+        "findings": [
+            {"severity": f.severity, "rule": f.rule, "prim": f.prim_path, "sentence": f.sentence} for f in findings
+        ],
+    }
+    lines = [f"{f.severity}: {f.rule}: {f.prim_path}: {f.sentence}" for f in findings]
+    verdict = f"{file}: {'valid' if not errors else f'{len(errors)} errors'}"
+    return Outcome(SOME_REFUSED if errors else DONE, facts, "\n".join([*lines, verdict]))
+
+
+def status(root: Path) -> Outcome:
+    """Say what is fresh, stale, failed or refused."""
+    studio = existing(root)
+    state = freshness(studio)
+    clips, songs = _clips(state, studio), _songs(state, studio)
+    findings = state.findings()
+    assets = [
+        {"asset": f.asset, "partition": f.key, "group": state.assets[f.asset].group, "state": f.state, "why": f.why}
+        for f in findings
+    ]
+    refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
+    notes = list(state.sources.notes)
+    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes}
+    report = _status_report(studio, clips, songs, assets, refused, notes)
+    return Outcome(SOME_REFUSED if refused else DONE, facts, report)
+
+
+def _status_report(
+    studio: StudioFolder,
+    clips: list[dict[str, Any]],
+    songs: list[dict[str, Any]],
+    assets: list[dict[str, Any]],
+    refused: list[dict[str, Any]],
+    notes: list[str],
+) -> str:
+    lines = [f"studio {studio.root}"]
+    for name, files in (("clips", clips), ("songs", songs)):
+        counts = _counts(files)
+        lines.append(
+            f"  {name}: " + ", ".join(f"{n} {state}" for state, n in counts.items() if n) + ("" if files else "none")
+        )
+    unfresh = [a for a in assets if a["state"] != "fresh"]
+    lines.append(f"  assets: {len(assets) - len(unfresh)} partitions fresh, {len(unfresh)} not")
+    lines += [f"    {a['state']}: {a['asset']}[{a['partition']}]: {a['why']}" for a in unfresh[:LONGEST_LIST]]
+    lines += _more(unfresh)
+    lines += [f"  {line}" for line in _refusals(refused)]
+    lines += [f"  note: {note}" for note in notes]
+    return "\n".join(lines)
+
+
+def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
+    """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
+    stored = {}
+    for session in studio.lake.keys("clip"):
+        for row in studio.lake.table("clip", session).to_pylist():
+            stored[row["path"]] = row
+    found = []
+    for clip in state.sources.clips:
+        path = clip.path.encode("utf-8", "backslashreplace").decode()
+        row = stored.get(path)
+        seen = _seen(row, clip.sha256, clip.problem)
+        found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
+    return found
+
+
+def _songs(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
+    stored = {}
+    for key in studio.lake.keys(SONG.name):
+        for row in studio.lake.table(SONG.name, key).to_pylist():
+            stored[row["path"]] = row
+    found = []
+    for song in state.sources.songs:
+        path = song.path.encode("utf-8", "backslashreplace").decode()
+        found.append({"path": path, "key": song.key, **_seen(stored.get(path), song.sha256, song.problem)})
+    return found
+
+
+def _seen(row: dict[str, Any] | None, sha256: str, problem: str) -> dict[str, Any]:
+    if problem:
+        return {"state": "refused", "reason": problem}
+    if row is None:
+        return {"state": "new", "reason": None}
+    if row["source_sha256"] != sha256:
+        return {"state": "changed", "reason": None}
+    return {"state": row["state"], "reason": row["reason"]}
+
+
+def _counts(files: list[dict[str, Any]]) -> dict[str, int]:
+    return {state: sum(f["state"] == state for f in files) for state in ("read", "refused", "new", "changed")}
+
+
+def _any_read(*lists: list[dict[str, Any]]) -> bool:
+    return any(f["state"] == "read" for files in lists for f in files)
+
+
+def _refusals(refused: list[dict[str, Any]]) -> list[str]:
+    return [f"refused: {f['path']}: {f['reason']}" for f in refused]
+
+
+def _more(items: Sequence[object]) -> list[str]:
+    return [f"    … and {len(items) - LONGEST_LIST} more"] if len(items) > LONGEST_LIST else []

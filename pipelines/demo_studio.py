@@ -1,0 +1,84 @@
+"""A made-up studio on disk: two procedural dancers on two rigs, and a drum-machine song as WAV and MIDI."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from assets.formats import audio, bvh, midi
+from assets.formats.audio import Audio
+from kernels.synthetic import rigs
+from kernels.synthetic.dancer import MOVES, Take, take
+from kernels.synthetic.music import drum_machine_song
+from pipelines.lake import write_beside
+from pipelines.resources import StudioError
+
+SONG = "drum_machine"
+TEMPO_BPM = 116.0
+_MARK = ".made-by-odori-demo"
+_SETTINGS = "# A made-up studio. Every key has a default; see 'docs/settings.md'.\n\n[dance]\nframe_rate_hz = 30\n"
+# Beat intervals of the takes, and where each dancer faces: near the song's own beat, and one far from it.
+_TAKES = ((0.50, 0.0, 1.0), (0.54, 0.8, 0.8), (0.62, -1.2, 1.1))
+
+
+def make(root: Path) -> None:
+    """Write the studio, the same bytes every time.
+
+    Raises
+    ------
+    StudioError
+        If the folder holds something else: nothing of a user's own is ever written over.
+    """
+    if root.exists() and (not root.is_dir() or (any(root.iterdir()) and not (root / _MARK).exists())):
+        raise StudioError(
+            f"{root}: want a new folder or an earlier demo, got something else; name another with --studio"
+        )
+    for path, data in _files():
+        place = root / path
+        if not place.is_file() or place.read_bytes() != data:
+            write_beside(place, _writer(data))
+
+
+def _writer(data: bytes) -> Callable[[IO[bytes]], int]:
+    return lambda file: file.write(data)
+
+
+def _files() -> Iterator[tuple[str, bytes]]:
+    yield _MARK, b""
+    yield "odori.toml", _SETTINGS.encode()
+    for dancer, plan, unit, up, rate_hz in (
+        ("ayame", rigs.RigPlan(axes=rigs.a_pose()), 0.01, "Y", 30.0),
+        (
+            "kaede",
+            rigs.RigPlan(axes=rigs.splayed(), stretch={"leftLowerLeg": 1.04, "rightLowerLeg": 1.04}),
+            1.0,
+            "Z",
+            60.0,
+        ),
+    ):
+        rows = ["file,label,style,subject,licence"]
+        for name, made in _takes(rate_hz):
+            yield (
+                f"clips/{dancer}/{name}.bvh",
+                bvh.format(rigs.author(made.clip, plan), metres_per_unit=unit, up_axis=up),
+            )
+            rows.append(f"{name}.bvh,{made.label},procedural,{dancer},CC0-1.0")
+        yield f"clips/{dancer}/clips.csv", ("\n".join(rows) + "\n").encode()
+    song = drum_machine_song(tempo_bpm=TEMPO_BPM, n_bars=16, seed=7)
+    yield f"songs/{SONG}.wav", audio.format_wav(Audio(song.render(), 44100))
+    yield f"songs/{SONG}.mid", midi.format(song.notes, tempo=song.tempo)
+
+
+def _takes(rate_hz: float) -> Iterator[tuple[str, Take]]:
+    for label in MOVES:
+        for number, (interval_s, turned, size) in enumerate(_TAKES, start=1):
+            yield (
+                f"{label}_{number:02d}",
+                take(label, n_beats=16, interval_s=interval_s, size=size, turned_rad=turned, frame_rate_hz=rate_hz),
+            )
+
+
+def beats_s() -> np.ndarray:
+    """When the beats of the made-up song are, (64,) float64, seconds."""
+    return drum_machine_song(tempo_bpm=TEMPO_BPM, n_bars=16, seed=7).beats.time_s

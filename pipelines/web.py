@@ -1,0 +1,68 @@
+"""Dagster's web UI on a studio: the web server and the daemon for sensor and schedule, as one process group.
+
+`dagster dev` started from a script ignores SIGTERM, so both are started here and ended here.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+
+from pipelines.build import open_instance
+from pipelines.lake import why
+from pipelines.resources import StudioError, StudioFolder
+
+
+def serve(root: Path, *, host: str, port: int) -> int:
+    """Serve until interrupted or until one of the two ends; exit status."""
+    studio = existing(root)
+    open_instance(studio)
+    environment = os.environ | {"ODORI_STUDIO": str(studio.root), "DAGSTER_DISABLE_TELEMETRY": "yes"}
+    module = ["-m", "pipelines.definitions"]
+    commands = (
+        [sys.executable, "-m", "dagster_webserver", "-h", host, "-p", str(port), *module],
+        [sys.executable, "-m", "dagster._daemon", "run", *module],
+    )
+    children = [subprocess.Popen(command, env=environment, cwd=studio.root) for command in commands]
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, end)
+    sys.stderr.write(f"odori: the studio {studio.root} is at http://{host}:{port}; stop with Ctrl-C\n")
+    try:
+        while all(child.poll() is None for child in children):
+            time.sleep(0.5)
+        return next(child.returncode for child in children if child.poll() is not None) or 1
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        for child in children:
+            child.terminate()
+        for child in children:
+            try:
+                child.wait(10)
+            except subprocess.TimeoutExpired:
+                child.kill()
+
+
+def existing(root: Path) -> StudioFolder:
+    """Open a studio folder that is there.
+
+    Raises
+    ------
+    StudioError
+        If it is missing or cannot be listed.
+    """
+    try:
+        if not root.is_dir():
+            raise StudioError(
+                f"{root}: want a studio folder with clips/ and songs/ in it, got nothing there; "
+                "name one with --studio or ODORI_STUDIO, or try 'odori demo'"
+            )
+    except OSError as error:
+        raise StudioError(f"{root}: cannot be read: {why(error)}") from error
+    return StudioFolder(root)
