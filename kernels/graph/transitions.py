@@ -38,11 +38,15 @@ _Pairs = tuple[Int, Int, Float, Float]
 N_NEAREST = 20
 GUARD_S = 0.5
 MIN_MARGIN_S = 0.1
-THRESHOLD = 8.0
 RAISE = 1.25
 
-FLOOR: dict[Metric, float] = {"position": 0.01**2, "rotation": 0.03**2}
-"""Least d(i): a pose that moves by a centimetre, or by 0.03 rad, across the beat. Frozen poses count as this."""
+THRESHOLD: dict[Metric, float] = {"position": 2.0, "rotation": 1.0}
+"""Default TH of equation 19. On real clips, seams of larger weight show as jerks (docs/motion-graph.md)."""
+
+LOCAL_BOUNDS: dict[Metric, tuple[float, float]] = {"position": (0.01**2, 0.3**2), "rotation": (0.03**2, 0.8**2)}
+"""Least and most d(i). Frozen poses count as moving by a centimetre (0.03 rad) across the beat: the ratio of equation
+19 would divide by nothing. A jump in a recording counts as no more than 0.3 m (0.8 rad), the fastest that bodies move on
+99 beats of 100: it would be near to everything."""
 
 _TILE = 2**22
 _CHUNK = 2**13
@@ -57,6 +61,7 @@ class Nearest:
     row, other : (P,) int64, nodes
     distance : (P,) float64, d(row, other), in the metric's unit squared
     weight : (P,) float64, d(row, other) / (d(row) + d(other)): equation 20
+    metric : "position" or "rotation"
     min_margin_s : float, seconds
         What the rows were made with: nearer pairs that only this margin forbids are listed beside the k nearest.
     """
@@ -65,6 +70,7 @@ class Nearest:
     other: Int
     distance: Float
     weight: Float
+    metric: Metric
     min_margin_s: float
 
 
@@ -95,15 +101,21 @@ def find_transitions(
     nodes: BeatNodes,
     *,
     distance: PairDistance = pose_distance,
-    threshold: float = THRESHOLD,
+    threshold: float | None = None,
     n_nearest: int = N_NEAREST,
     guard_s: float = GUARD_S,
     min_margin_s: float = MIN_MARGIN_S,
-    floor: float | None = None,
+    local_bounds: tuple[float, float] | None = None,
 ) -> Transitions:
     """Make the motion graph of all beats: :func:`nearest`, then :func:`connect`; arguments and errors are theirs."""
     pairs = nearest(
-        features, nodes, distance=distance, n_nearest=n_nearest, guard_s=guard_s, min_margin_s=min_margin_s, floor=floor
+        features,
+        nodes,
+        distance=distance,
+        n_nearest=n_nearest,
+        guard_s=guard_s,
+        min_margin_s=min_margin_s,
+        local_bounds=local_bounds,
     )
     return connect(nodes, pairs, threshold=threshold)
 
@@ -117,7 +129,7 @@ def nearest(
     n_nearest: int = N_NEAREST,
     guard_s: float = GUARD_S,
     min_margin_s: float = MIN_MARGIN_S,
-    floor: float | None = None,
+    local_bounds: tuple[float, float] | None = None,
 ) -> Nearest:
     """List the k nearest nodes of each node by equation 20, whatever their weight.
 
@@ -133,8 +145,8 @@ def nearest(
         Nodes of the same clip nearer in time than this are the same moment, never a transition; nor is the next beat.
     min_margin_s : float, seconds, >= 0
         Frames a transition needs before and after it (module docstring).
-    floor : float, > 0, in the metric's unit squared, or None for :data:`FLOOR`
-        Least d(i): where the pose does not move across the beat, the ratio of equation 19 would divide by nothing.
+    local_bounds : (low, high), 0 < low <= high, in the metric's unit squared, or None for :data:`LOCAL_BOUNDS`
+        Every d(i) is brought within these.
 
     Returns
     -------
@@ -159,27 +171,26 @@ def nearest(
     for name, value in (("guard_s", guard_s), ("min_margin_s", min_margin_s)):
         if not (np.isfinite(value) and value >= 0):
             raise ValueError(f"{name}: want finite, >= 0, got {value}")
-    floor = FLOOR[features.pose.metric] if floor is None else floor
-    if not (np.isfinite(floor) and floor > 0):
-        raise ValueError(f"floor: want finite, > 0, got {floor}")
+    low, high = LOCAL_BOUNDS[features.pose.metric] if local_bounds is None else local_bounds
+    if not (np.isfinite(high) and 0 < low <= high):
+        raise ValueError(f"local_bounds: want 0 < low <= high, finite, got {(low, high)}")
     rows = np.arange(len(nodes)) if rows is None else np.asarray(rows, np.int64)
-    search = _Search(
-        features, np.maximum(features.local_distance, floor), nodes, distance, n_nearest, guard_s, min_margin_s
-    )
+    local = np.clip(features.local_distance, low, high)
+    search = _Search(features, local, nodes, distance, n_nearest, guard_s, min_margin_s)
     parts = list(search.tiles(rows))
     row, other, apart, weight = (np.concatenate([part[i] for part in parts]) for i in range(4))
     order = np.lexsort((other, weight, row))
-    return Nearest(row[order], other[order], apart[order], weight[order], min_margin_s)
+    return Nearest(row[order], other[order], apart[order], weight[order], features.pose.metric, min_margin_s)
 
 
-def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float = THRESHOLD) -> Transitions:
+def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float | None = None) -> Transitions:
     """Join the listed pairs whose weight is below the threshold: equations 19 and 20 of JP5778523B2.
 
     Parameters
     ----------
     nodes : BeatNodes, N
     pairs : Nearest of these nodes
-    threshold : float, > 0, TH of equation 19
+    threshold : float, > 0, TH of equation 19, or None for :data:`THRESHOLD`
 
     Returns
     -------
@@ -199,6 +210,7 @@ def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float = THRESHOLD) -
     When with the threshold asked no dance can go on for ever (no cycle), it is raised by steps of a quarter until one
     can. Where all pairs together make none, the threshold asked is kept.
     """
+    threshold = THRESHOLD[pairs.metric] if threshold is None else threshold
     if not (np.isfinite(threshold) and threshold > 0):
         raise ValueError(f"threshold: want finite, > 0, got {threshold}")
     used = threshold

@@ -5,19 +5,19 @@ from kernels.graph import transitions
 from kernels.graph.distance import PoseFeatures, pose_distance
 from kernels.graph.features import BeatFeatures
 from kernels.graph.nodes import beat_nodes
-from kernels.graph.transitions import FLOOR, RAISE, connect, find_transitions, nearest
+from kernels.graph.transitions import LOCAL_BOUNDS, RAISE, THRESHOLD, connect, find_transitions, nearest
 
 
 @pytest.fixture
 def on_a_line():
-    """Beats whose poses are numbers: (values of each clip, beat spacing, local distance) to features and nodes."""
+    """Beats whose poses are numbers, decimetres: (values of each clip, spacing, d(i) in dm²) to features and nodes."""
 
     def make(clips, spacing_s=1.0, local=1.0, lead_s=0.5):
         times = [lead_s + spacing_s * np.arange(len(values)) for values in clips]
         nodes = beat_nodes(times, [lead_s + spacing_s * len(values) for values in clips])
-        linear = np.concatenate([*map(np.asarray, clips), np.zeros(0)])[:, None].astype(float)
+        linear = 0.1 * np.concatenate([*map(np.asarray, clips), np.zeros(0)])[:, None]
         pose = PoseFeatures("position", linear, np.zeros((len(linear), 0, 4)), np.zeros(0))
-        return BeatFeatures(pose, np.full(len(linear), float(local))), nodes
+        return BeatFeatures(pose, np.full(len(linear), 0.01 * local)), nodes
 
     return make
 
@@ -42,9 +42,9 @@ def in_float32(rows, columns):
     return (exact * (1 + 3e-7 * noise)).astype(np.float32)
 
 
-def brute_force(features, nodes, k, guard_s, margin_s, floor):
+def brute_force(features, nodes, k, guard_s, margin_s):
     """The rules of nearest, one pair at a time."""
-    local = np.maximum(features.local_distance, floor)
+    local = np.clip(features.local_distance, *LOCAL_BOUNDS[features.pose.metric])
     weight = pose_distance(features.pose, features.pose) / np.add.outer(local, local)
     listed = []
     for i in range(len(nodes)):
@@ -74,15 +74,17 @@ def test_weight_is_the_ratio_of_equation_20(on_a_line):
     features, nodes = on_a_line([[0, 10, 20], [0.5, 12, 20]], local=0.25)
     found = find_transitions(features, nodes, threshold=100.0, n_nearest=1)
     at = edges(found).index((1, 4))
-    assert found.distance[at] == 4.0
-    assert found.graph.weight[at] == 4.0 / (0.25 + 0.25)
+    assert found.distance[at] == pytest.approx(0.04)
+    assert found.graph.weight[at] == pytest.approx(0.04 / (0.0025 + 0.0025))
 
 
 def test_only_below_the_threshold(on_a_line):
     features, nodes = on_a_line([[0, 1, 0, 1, 3], [0, 1, 0, 1, 3]], local=0.5)
-    weights = find_transitions(features, nodes, threshold=1.0).graph.weight
-    assert (weights < 1.0).all()
-    assert 1.0 in find_transitions(features, nodes, threshold=1.0 + 1e-12).graph.weight
+    weights = find_transitions(features, nodes, threshold=1.0 - 1e-9).graph.weight
+    assert (weights < 0.9).all()
+    more = find_transitions(features, nodes, threshold=1.0 + 1e-9).graph.weight
+    assert more.max() == pytest.approx(1.0)
+    assert len(more) > len(weights)
 
 
 def test_k_nearest_with_ties_to_the_lower_node(on_a_line):
@@ -130,12 +132,27 @@ def test_a_transition_is_left_after_a_beat_and_entered_before_one(on_a_line):
         assert nodes.next_node[target] >= 0
 
 
-def test_frozen_poses_use_the_floor(on_a_line):
-    features, nodes = on_a_line([[0, 0.015, 0], [0, 0.03, 0]], local=0.0)
+def test_frozen_poses_count_as_moving_a_little(on_a_line):
+    features, nodes = on_a_line([[0, 0.15, 0], [0, 0.3, 0]], local=0.0)
     found = find_transitions(features, nodes, threshold=1e9)
     at = edges(found).index((1, 4))
-    assert found.graph.weight[at] == pytest.approx(0.015**2 / (2 * FLOOR["position"]))
+    assert found.graph.weight[at] == pytest.approx(0.015**2 / (2 * LOCAL_BOUNDS["position"][0]))
     assert np.isfinite(found.graph.weight).all()
+
+
+def test_a_jump_in_a_recording_is_not_near_to_everything(on_a_line):
+    features, nodes = on_a_line([[0, 10, 0], [0, 30, 0]], local=1.0)
+    broken = BeatFeatures(features.pose, np.where(np.arange(6) == 4, 25.0, features.local_distance))
+    assert (1, 4) in edges(find_transitions(broken, nodes, threshold=2.0, local_bounds=(1e-4, 100.0)))
+    assert (1, 4) not in edges(find_transitions(broken, nodes, threshold=2.0))
+    pairs = nearest(broken, nodes)
+    weight = pairs.weight[(pairs.row == 1) & (pairs.other == 4)]
+    np.testing.assert_allclose(weight, 2.0**2 / (0.01 + LOCAL_BOUNDS["position"][1]))
+
+
+def test_default_threshold_is_the_metrics(make_catalogue):
+    for metric in ("position", "rotation"):
+        assert find_transitions(*make_catalogue(20, metric)).threshold_asked == THRESHOLD[metric]
 
 
 def test_threshold_is_raised_until_a_dance_can_go_on(on_a_line):
@@ -166,7 +183,7 @@ def test_threshold_stays_where_raising_does_not_help(on_a_line):
 def test_agrees_with_brute_force(make_catalogue, metric, seed, k, guard_s, margin_s):
     features, nodes = make_catalogue(metric=metric, seed=seed)
     arguments = {"n_nearest": k, "guard_s": guard_s, "min_margin_s": margin_s}
-    expected = brute_force(features, nodes, k, guard_s, margin_s, FLOOR[metric])
+    expected = brute_force(features, nodes, k, guard_s, margin_s)
     for distance in (pose_distance, in_float32):
         pairs = nearest(features, nodes, distance=distance, **arguments)
         assert list(zip(pairs.row.tolist(), pairs.other.tolist(), strict=True)) == sorted(
@@ -220,7 +237,8 @@ def test_errors(on_a_line):
         ({"n_nearest": 0}, "n_nearest"),
         ({"guard_s": -1.0}, "guard_s"),
         ({"min_margin_s": np.nan}, "min_margin_s"),
-        ({"floor": 0.0}, "floor"),
+        ({"local_bounds": (0.0, 1.0)}, "local_bounds"),
+        ({"local_bounds": (2.0, 1.0)}, "local_bounds"),
         ({"threshold": 0.0}, "threshold"),
     ]:
         with pytest.raises(ValueError, match=message):
