@@ -153,9 +153,9 @@ def frame_rate_hz(frame_time_text: str) -> float:
     -------
     float, Hz
         A whole number where the frame time is within 0.15 % of one (0.002 % when written with 8 digits or more), or
-        is a common rate (24, 25, 30 … 240) rounded or cut to the digits written. The rates of video, n × 1000 / 1001,
-        where the text has at least 6 digits and is one of them to its last digit: ``0.0417083750417`` is 23.976,
-        while ``0.008342`` is 120. Else one over the frame time.
+        is a common rate (24, 25, 30 … 240) rounded or cut to the digits written. The rates of video (n × 1000 / 1001,
+        or that with two or three decimals) where the text has at least 6 digits and is one of them to its last digit:
+        ``0.0417083750417`` is 23.976, while ``0.008342`` is 120. Else one over the frame time.
 
     Raises
     ------
@@ -175,7 +175,8 @@ def frame_rate_hz(frame_time_text: str) -> float:
     last_digit_s = 1.0000001 * 10.0**-n_decimals
     rate = 1.0 / frame_time_s
     whole = max(round(rate), 1)
-    video = whole * 1000 / 1001
+    ratio = whole * 1000 / 1001
+    video = min((round(ratio, 2), round(ratio, 3), ratio), key=lambda common: abs(1 / common - frame_time_s))
     if n_digits >= 6 and abs(1 / video - frame_time_s) <= min(last_digit_s, 1e-5 * frame_time_s):
         return video
     if abs(whole * frame_time_s - 1.0) <= (0.0015 if n_digits < 8 else 2e-5):

@@ -25,6 +25,7 @@ _MOTION = re.compile(rb"(?:^|[\n}])[^\S\n]*MOTION(?![^\s:])", re.IGNORECASE)
 _OPENERS = {"ROOT", "JOINT", "END", "ENDSITE"}
 _WANT_WORD = "want OFFSET, CHANNELS, JOINT, End Site or }"
 _WANT_CHANNELS = f"want CHANNELS, a count and as many of {', '.join(CHANNELS)}, no position twice"
+_BLANK = re.compile(rb"\s*")
 _FRAMES = re.compile(rb"\s*Frames\s*:?[^\S\n]*([^\n]*)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*Frame[^\S\n]*Time\s*:?[^\S\n]*([^\s]*)[^\S\n]*", re.IGNORECASE)
 
@@ -176,7 +177,7 @@ def _parse_joints(text: str, path: str, *, is_whole: bool) -> list[_Joint]:
                 opening = _begin(keyword, " ".join(words[at + 1 : stop]), joints, stack, path, number)
                 at = stop
             elif not stack:
-                raise FormatError(path, number, f"want ROOT, got {word[:40]!r}")
+                raise FormatError(path, number, f"want {'MOTION' if joints else 'ROOT'}, got {word[:40]!r}")
             elif keyword == "OFFSET":
                 joints[stack[-1]].offset = _numbers(words[at + 1 : at + 4], path, number)
                 at += 4
@@ -242,7 +243,8 @@ def _parse_motion(data: bytes, at: int, path: str) -> tuple[int, str, int, int]:
     """Frame count, frame time as written and its line, and the byte where the numbers start."""
 
     def line_of(position: int) -> int:
-        return 1 + data.count(b"\n", 0, position)
+        blank = _BLANK.match(data, position)
+        return 1 + data.count(b"\n", 0, blank.end() if blank else position)
 
     if data[at : at + 1] == b":":
         at += 1
