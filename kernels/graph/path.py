@@ -86,7 +86,7 @@ def find_path(
     steps: tuple[tuple[int, int], ...] = STEPS,
     starts: Literal["first", "any"] | Int = "first",
     admissible: Mask | None = None,
-    rounds: int = 2,
+    rounds: int = 3,
     strict: bool = False,
 ) -> Path:
     """Find the cheapest dance for a song.
@@ -102,7 +102,7 @@ def find_path(
     admissible : (K, N) bool or None
         Whether music interval k may be danced with a step that starts at the node. None admits everything.
     rounds : int, >= 0
-        Passes that spread repetition over the whole dance; 0 prices it within the program only.
+        How often a dance is made to spread repetition; 0 prices it within the program only.
     strict : bool
         Refuse a dance that leaves the hard warp bounds anywhere.
 

@@ -46,32 +46,49 @@ def spread(
 
     Notes
     -----
-    1. *A dance made forwards.* Window by window from the song's start: every stretch costs ``usage`` times how often it
-       was shown so far; what follows the window costs what the exact solution says (a lower bound of the truth, and
-       finite only where the last beat is reached). The first half of each window is kept.
-    2. *Rounds.* The cheaper of the two dances is mended: each window is solved again between its neighbours, every
-       stretch priced by its showings outside the window, and kept when the whole dance becomes cheaper. After the first
-       round only windows that show something twice; a round without gain is the last.
+    Each round makes one dance, in three moves.
 
-    Within a window a stretch may still come twice at the price of once: the window is short, and going back in the same
-    clip is priced by the program itself.
+    1. *What is to come.* The whole song is solved with every stretch at a price: nothing in the first round, later the
+       mean over the rounds so far of ``usage`` times its showings beyond the first. This tells a round that a tempting
+       loop will be danced too often, which no window can see.
+    2. *A dance made forwards.* Window by window from the song's start: a stretch costs ``usage`` times how often it was
+       shown so far, what follows the window costs what the first move says. The first half of each window is kept.
+    3. *Mending.* Each window that shows something twice is solved again between its neighbours, every stretch priced by
+       its showings outside the window, and kept when the whole dance becomes cheaper.
+
+    A dance that shows nothing twice ends the rounds. Within a window a stretch may still come twice at the price of
+    once: the window is short, and going back in the same clip is priced by the program itself.
     """
     best, cost = moves, total(moves)
     if rounds == 0 or program.costs.usage == 0 or not (_uses(program, best) > 1).any():
         return best
-    made = _make_forwards(program, whole, starts)
-    if total(made) < cost:
-        best, cost = made, total(made)
-    for turn in range(rounds):
+    shown_again = np.zeros(program.n_nodes)
+    for turn in range(1, rounds + 1):
+        made = _sweep(program, _make_forwards(program, whole, starts), starts, total)
+        made_cost = total(made)
+        if made_cost < cost:
+            best, cost = made, made_cost
+        again = np.maximum(_uses(program, made) - 1, 0)
+        if turn == rounds or not again.any():
+            break
+        shown_again += again
+        end = {program.n_beats: np.zeros(program.n_nodes)}
+        whole = program.solve(0, program.n_beats, after=end, price=program.costs.usage * shown_again / turn)
+    return best
+
+
+def _sweep(program: Program, moves: list[Move], starts: Int, total: Callable[[list[Move]], float]) -> list[Move]:
+    """Mend all windows, twice, the second time between the first's; a sweep without gain is the last."""
+    cost = total(moves)
+    for offset in (0, -(WINDOW // 4)):
         before = cost
-        offset = 0 if turn % 2 == 0 else -(WINDOW // 4)
         for begin in range(offset, program.n_beats, ADVANCE):
-            mended = _mend(program, best, begin, starts)
+            mended = _mend(program, moves, begin, starts)
             if mended is not None and total(mended) < cost - 1e-9:
-                best, cost = mended, total(mended)
+                moves, cost = mended, total(mended)
         if not cost < before:
             break
-    return best
+    return moves
 
 
 def _uses(program: Program, moves: list[Move]) -> Int:

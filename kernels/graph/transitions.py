@@ -45,8 +45,8 @@ THRESHOLD: dict[Metric, float] = {"position": 2.0, "rotation": 1.0}
 
 LOCAL_BOUNDS: dict[Metric, tuple[float, float]] = {"position": (0.01**2, 0.3**2), "rotation": (0.03**2, 0.8**2)}
 """Least and most d(i). Frozen poses count as moving by a centimetre (0.03 rad) across the beat: the ratio of equation
-19 would divide by nothing. A jump in a recording counts as no more than 0.3 m (0.8 rad), the fastest that bodies move on
-99 beats of 100: it would be near to everything."""
+19 would divide by nothing. A jump in a recording counts as no more than 0.3 m (0.8 rad), the fastest that bodies move
+on 99 beats of 100: it would be near to everything."""
 
 _TILE = 2**22
 _CHUNK = 2**13
