@@ -27,6 +27,7 @@ BONE: dict[str, str] = {"neck": "head"} | {
 }
 
 
+_NATURAL_RAD = np.radians(35.0)
 _HINGE: dict[tuple[str, ...], tuple[str, str, str]] = {
     topology.ARM: ("UpperArm", "LowerArm", "Hand"),
     topology.LEG: ("UpperLeg", "LowerLeg", "Foot"),
@@ -182,20 +183,30 @@ def _from_rest(rig: Rig, body: Float) -> dict[int, Float]:
     chest = body
     for a, b in zip(rig.spine, [*rig.spine[1:], rig.neck[0]], strict=True):
         chest = neutral[a] = swing(chest, a, b, Y)
+    # A back that curves and a neck that leans are anatomy: they tilt bones, but neither arms nor head.
+    chest = _natural(chest, body)
     here = chest
-    for a, b in zip(rig.neck, [*rig.neck[1:], rig.neck[-1]], strict=True):
+    for a, b in pairwise(rig.neck):
         here = neutral[a] = swing(here, a, b, Y)
+    neutral[rig.neck[-1]] = _natural(here, chest)
     for side in SIDES:
         for limb, start in ((topology.ARM, chest), (topology.LEG, body)):
             here = start
             chain = [side + part for part in limb if side + part in at]
             for name, child in zip(chain, [*chain[1:], None], strict=True):
+                if name.endswith("UpperArm"):
+                    here = _natural(here, chest)
                 if name.endswith("Foot") and child is not None:
                     here = _flat_foot(rig, here, body, rest[at[child]] - rest[at[name]])
                 elif child is not None:
                     here = swing(here, at[name], at[child], bone_direction(name))
                 neutral[at[name]] = here
     return neutral
+
+
+def _natural(turned: Float, level: Float) -> Float:
+    """Take the orientation for level where it is no further from that than bodies are built."""
+    return level if rotation.angle_between(turned, level) < _NATURAL_RAD else turned
 
 
 def _swing(direction: Float, target: Float, turned: Float) -> Float:
