@@ -14,11 +14,9 @@ import numpy as np
 from kernels.graph.program import Move, Program, Solution
 from kernels.types import Int
 
-WINDOW = 16
-"""Music intervals solved at a time."""
-
-ADVANCE = 8
-"""Music intervals between the starts of two windows."""
+WINDOWS = (12, 6)
+"""Music intervals solved at a time: wide windows find other ways, narrow ones see what comes twice nearby. Each begins
+half a window after the one before."""
 
 
 def spread(
@@ -53,8 +51,8 @@ def spread(
        loop will be danced too often, which no window can see.
     2. *A dance made forwards.* Window by window from the song's start: a stretch costs ``usage`` times how often it was
        shown so far, what follows the window costs what the first move says. The first half of each window is kept.
-    3. *Mending.* Each window that shows something twice is solved again between its neighbours, every stretch priced by
-       its showings outside the window, and kept when the whole dance becomes cheaper.
+    3. *Mending.* Each window, wide or narrow, that shows something twice is solved again between its neighbours, every
+       stretch priced by its showings outside the window, and kept when the whole dance becomes cheaper.
 
     A dance that shows nothing twice ends the rounds. Within a window a stretch may still come twice at the price of
     once: the window is short, and going back in the same clip is priced by the program itself.
@@ -78,16 +76,13 @@ def spread(
 
 
 def _sweep(program: Program, moves: list[Move], starts: Int, total: Callable[[list[Move]], float]) -> list[Move]:
-    """Mend all windows, twice, the second time between the first's; a sweep without gain is the last."""
+    """Mend all windows, wide ones first."""
     cost = total(moves)
-    for offset in (0, -(WINDOW // 4)):
-        before = cost
-        for begin in range(offset, program.n_beats, ADVANCE):
-            mended = _mend(program, moves, begin, starts)
+    for window in WINDOWS:
+        for begin in range(0, program.n_beats, window // 2):
+            mended = _mend(program, moves, begin, begin + window, starts)
             if mended is not None and total(mended) < cost - 1e-9:
                 moves, cost = mended, total(mended)
-        if not cost < before:
-            break
     return moves
 
 
@@ -101,12 +96,12 @@ def _make_forwards(program: Program, whole: Solution, starts: Int) -> list[Move]
     beat, arrived = 0, None
     used = np.zeros(program.n_nodes, np.int64)
     while beat < program.n_beats:
-        last = min(beat + WINDOW, program.n_beats)
+        last = min(beat + WINDOWS[0], program.n_beats)
         reach = max(d for _, d in program.steps)
         after = {k: whole.arrive[k] for k in range(last, min(last + reach, program.n_beats + 1))}
         price = np.asarray(program.costs.usage * used, np.float64)
         part = program.solve(beat, last, after=after, price=price)
-        stop = last if last == program.n_beats else beat + ADVANCE
+        stop = last if last == program.n_beats else beat + WINDOWS[0] // 2
         new = program.decode(part, first=beat, last=stop, arrived=arrived, starts=starts, price=price)
         used += _uses(program, new)
         moves += new
@@ -114,11 +109,11 @@ def _make_forwards(program: Program, whole: Solution, starts: Int) -> list[Move]
     return moves
 
 
-def _mend(program: Program, moves: list[Move], begin: int, starts: Int) -> list[Move] | None:
+def _mend(program: Program, moves: list[Move], begin: int, end: int, starts: Int) -> list[Move] | None:
     """Solve one window again, the rest of the dance as it is; None where there is nothing to gain."""
     beats = np.array([beat for beat, _, _ in moves] + [program.n_beats])
-    low = int(np.searchsorted(beats, max(begin, 0)))
-    high = min(int(np.searchsorted(beats, begin + WINDOW)), len(moves))
+    low = int(np.searchsorted(beats, begin))
+    high = min(int(np.searchsorted(beats, end)), len(moves))
     if low >= high:
         return None
     inside, uses = moves[low:high], _uses(program, moves)
