@@ -56,7 +56,7 @@ def _family(centre: str, arm: str, leg: str) -> dict[str, tuple[str, ...]]:
 
 # Only hips, head and limbs are told by name: what lies between hips and arms is the spine, above it the neck.
 _FAMILIES: dict[str, dict[str, tuple[str, ...]]] = {
-    "vrm": _family("hips head", "shoulder upperarm lowerarm hand", "upperleg lowerleg foot toes"),
+    "vrm": _family("hips head", "shoulder upperarm lowerarm hand", "upperleg lowerleg foot toes/toebase/toe"),
     "lafan1": _family("hips head", "shoulder arm forearm hand", "upleg leg foot toe"),
     "humanik": _family(
         "hips/hip/pelvis/root head",
