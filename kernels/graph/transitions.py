@@ -40,7 +40,8 @@ GUARD_S = 0.5
 MIN_MARGIN_S = 0.1
 RAISE = 1.25
 
-THRESHOLD: dict[Metric, float] = {"position": 2.0, "rotation": 1.0}
+THRESHOLD = 2.0
+THRESHOLDS: dict[Metric, float] = {"position": THRESHOLD, "rotation": 1.0}
 """Default TH of equation 19. On real clips, seams of larger weight show as jerks (docs/motion-graph.md)."""
 
 LOCAL_BOUNDS: dict[Metric, tuple[float, float]] = {"position": (0.01**2, 0.3**2), "rotation": (0.03**2, 0.8**2)}
@@ -190,7 +191,7 @@ def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float | None = None)
     ----------
     nodes : BeatNodes, N
     pairs : Nearest of these nodes
-    threshold : float, > 0, TH of equation 19, or None for :data:`THRESHOLD`
+    threshold : float, > 0, TH of equation 19, or None for :data:`THRESHOLDS`
 
     Returns
     -------
@@ -210,7 +211,7 @@ def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float | None = None)
     When with the threshold asked no dance can go on for ever (no cycle), it is raised by steps of a quarter until one
     can. Where all pairs together make none, the threshold asked is kept.
     """
-    threshold = THRESHOLD[pairs.metric] if threshold is None else threshold
+    threshold = THRESHOLDS[pairs.metric] if threshold is None else threshold
     if not (np.isfinite(threshold) and threshold > 0):
         raise ValueError(f"threshold: want finite, > 0, got {threshold}")
     used = threshold

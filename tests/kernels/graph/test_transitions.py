@@ -5,7 +5,7 @@ from kernels.graph import transitions
 from kernels.graph.distance import PoseFeatures, pose_distance
 from kernels.graph.features import BeatFeatures
 from kernels.graph.nodes import beat_nodes
-from kernels.graph.transitions import LOCAL_BOUNDS, RAISE, THRESHOLD, connect, find_transitions, nearest
+from kernels.graph.transitions import LOCAL_BOUNDS, RAISE, THRESHOLDS, connect, find_transitions, nearest
 
 
 @pytest.fixture
@@ -152,7 +152,7 @@ def test_a_jump_in_a_recording_is_not_near_to_everything(on_a_line):
 
 def test_default_threshold_is_the_metrics(make_catalogue):
     for metric in ("position", "rotation"):
-        assert find_transitions(*make_catalogue(20, metric)).threshold_asked == THRESHOLD[metric]
+        assert find_transitions(*make_catalogue(20, metric)).threshold_asked == THRESHOLDS[metric]
 
 
 def test_threshold_is_raised_until_a_dance_can_go_on(on_a_line):
