@@ -43,14 +43,17 @@ class Give:
         Weight of the root's added speed against the feet's added slide; small lets the root follow the feet.
     root_smooth_s : float, seconds
         Time over which the root may change its added speed.
+    root_lift_s : float, seconds
+        Time over which the root comes to the height that planted feet ask for.
     leg_limit_rad : float, radians
         Most that a thigh or a shin may turn from the source's direction.
     fade_s : float, seconds
         Over which a leg returns to its source before and after a contact.
     """
 
-    root_speed_weight: float = 0.02
-    root_smooth_s: float = 0.05
+    root_speed_weight: float = 0.05
+    root_smooth_s: float = 0.1
+    root_lift_s: float = 0.1
     leg_limit_rad: float = float(np.radians(2.5))
     fade_s: float = 0.15
 
@@ -98,8 +101,9 @@ def plant_root(
     lift = height[:, None, None] - error[..., 1]
     weight = mask.astype(np.float64)
     weight[1] += 1e-4 * _is_lower(source_toes_xyz_m)
+    weight *= give.root_speed_weight / give.root_lift_s**2
     out[:, 1] = _solve(
-        n, frame_rate_hz, give, place_weight=1e3 * weight.sum(axis=(0, 2)), place=1e3 * (weight * lift).sum(axis=(0, 2))
+        n, frame_rate_hz, give, place_weight=weight.sum(axis=(0, 2)), place=(weight * lift).sum(axis=(0, 2))
     )
     return out
 
