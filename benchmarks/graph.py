@@ -6,8 +6,8 @@
 fairmotion's construction (for every pair the two poses are aligned and compared joint by joint with small arrays), all
 on the same poses in one run; and beside fairmotion itself, 528 s for 378 nodes, measured elsewhere and quoted. *Graph*:
 features, all pairs, edges, pruning, each metric in a process of its own for its peak of memory. *Path*: a random graph
-of as many nodes with 20 transitions each. Every figure is the median of the repeats after one warm-up; ``spread_ratio`` is
-(slowest - fastest) / median.
+of as many nodes with 20 transitions each. Every figure is the median of the repeats after one warm-up; ``spread_ratio``
+is (slowest - fastest) / median.
 """
 
 from __future__ import annotations
