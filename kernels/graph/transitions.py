@@ -37,7 +37,8 @@ _Pairs = tuple[Int, Int, Float, Float]
 
 N_NEAREST = 20
 GUARD_S = 0.5
-MIN_MARGIN_S = 0.1
+MIN_MARGIN_S = 0.2
+"""Half of a blend of 0.4 s."""
 RAISE = 1.25
 
 THRESHOLD = 2.0

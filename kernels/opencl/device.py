@@ -7,6 +7,10 @@ from dataclasses import dataclass
 import pyopencl as cl
 
 
+class NoDeviceError(LookupError):
+    """There is no OpenCL device, or none as wanted; the message lists what is there."""
+
+
 @dataclass(frozen=True)
 class DeviceInfo:
     """One device as a person sees it.
@@ -80,12 +84,12 @@ def pick_device(wanted: str | int | None = None) -> cl.Device:
 
     Raises
     ------
-    LookupError
+    NoDeviceError
         If there is no device at all, or none is as wanted; the message lists what is there. Never another device.
     """
     devices = list_devices()
     if not devices:
-        raise LookupError(
+        raise NoDeviceError(
             "device: want an OpenCL device, found none; install a driver (pocl-binary-distribution brings one "
             "for the CPU) or choose the reference backend"
         )
@@ -99,7 +103,7 @@ def pick_device(wanted: str | int | None = None) -> cl.Device:
             if wanted.casefold() in f"{device.name} {device.platform.name}".casefold():
                 return device
     there = "; ".join(str(info) for info in describe_devices())
-    raise LookupError(f"device: want {wanted!r}, found only {there}; name one of these by index or part of its name")
+    raise NoDeviceError(f"device: want {wanted!r}, found only {there}; name one of these by index or part of its name")
 
 
 def _kind(device: cl.Device) -> str:

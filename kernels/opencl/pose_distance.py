@@ -44,10 +44,11 @@ class PoseDistance:
         preferred = self._device.preferred_vector_width_float
         self._lanes = max(width for width in _LANES if width <= max(2 * preferred, _LANES[0]))
         source = resources.files("kernels.opencl").joinpath("pose_distance.cl").read_text(encoding="utf-8")
-        program = cl.Program(context, source).build(options=["-D", f"ROWS={_ROWS}", "-D", f"LANES={self._lanes}"])
-        self._kernel = cl.Kernel(program, "pose_distance")
+        options = ["-D", f"ROWS={_ROWS}", "-D", f"LANES={self._lanes}"]
+        self._program = cl.Program(context, source).build(options=options)
         self._queue = cl.CommandQueue(context)
-        limit = self._kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self._device)
+        kernel = cl.Kernel(self._program, "pose_distance")
+        limit = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self._device)
         width, height = (
             min(wanted, most) for wanted, most in zip(_GROUP, self._device.max_work_item_sizes, strict=False)
         )
@@ -110,11 +111,14 @@ class PoseDistance:
         answer = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, size=4 * height * width)
         size = (_up(width // self._lanes, self._group[0]), _up(height // _ROWS, self._group[1]))
         counts = (like.linear.shape[1], len(like.quaternion_weight), height, width)
-        self._kernel.set_args(
+        kernel = cl.Kernel(
+            self._program, "pose_distance"
+        )  # its own: arguments belong to the kernel, threads may share us
+        kernel.set_args(
             *(np.int32(count) for count in counts),
             *(row_linear, column_linear, row_quaternion, column_quaternion, weight, answer),
         )
-        cl.enqueue_nd_range_kernel(self._queue, self._kernel, size, self._group)
+        cl.enqueue_nd_range_kernel(self._queue, kernel, size, self._group)
         whole = (
             out if out.shape == (height, width) and out.flags.c_contiguous else np.zeros((height, width), np.float32)
         )

@@ -1,7 +1,7 @@
 import pytest
 
 from kernels.opencl import device
-from kernels.opencl.device import describe_devices, list_devices, pick_device
+from kernels.opencl.device import NoDeviceError, describe_devices, list_devices, pick_device
 
 pytestmark = pytest.mark.opencl
 
@@ -37,14 +37,14 @@ def test_without_a_gpu_the_cpu_is_picked(three_devices):
 
 @pytest.mark.parametrize("wanted", [3, -1, "7", "quantum"])
 def test_an_absent_device_is_an_error_that_lists_the_others(three_devices, wanted):
-    with pytest.raises(LookupError, match=r"0: Some CPU \(CPU, Platform P\); 1: Fast GPU 1 \(GPU, .*; 2: Fast GPU 2"):
+    with pytest.raises(NoDeviceError, match=r"0: Some CPU \(CPU, Platform P\); 1: Fast GPU 1 \(GPU, .*; 2: Fast GPU 2"):
         pick_device(wanted)
 
 
 @pytest.mark.parametrize("wanted", [None, 0, "cpu"])
 def test_no_device_is_an_error_with_a_remedy(monkeypatch, wanted):
     monkeypatch.setattr(device, "list_devices", list)
-    with pytest.raises(LookupError, match="found none; install a driver"):
+    with pytest.raises(NoDeviceError, match="found none; install a driver"):
         pick_device(wanted)
 
 

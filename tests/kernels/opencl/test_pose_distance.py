@@ -1,3 +1,5 @@
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pyopencl as cl
 import pytest
@@ -99,3 +101,17 @@ def test_poses_made_differently_are_refused_as_by_the_reference(twin, make_poses
 
 def test_names_its_device(twin):
     assert any(device.name.strip() in twin.name for device in DEVICES)
+
+
+def test_threads_may_share_it(twin, make_poses):
+    sets = [make_poses(40 + i, "position", i) for i in range(8)]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda poses: twin(poses, poses), sets))
+    for poses, distance in zip(sets, together, strict=True):
+        np.testing.assert_array_equal(distance, twin(poses, poses))
+
+
+def test_a_context_of_no_single_device_is_refused():
+    context = type("Context", (), {"devices": [DEVICES[0], DEVICES[0]]})()
+    with pytest.raises(ValueError, match="want one device, got 2"):
+        PoseDistance(context)
