@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from kernels import rotation
 from kernels.assembly.timing import clock
@@ -80,7 +80,7 @@ def sample(clip: Clip, time_s: Float) -> tuple[Float, Float]:
         [clip.root_xyz_m[low:high], rotation.continuous(clip.rotation_wxyz[low:high]).reshape(high - low, -1)], axis=1
     )
     if len(knots) >= 4:
-        found = CubicSpline(knots, values, axis=0, bc_type="natural")(frame)
+        found = scipy.interpolate.CubicSpline(knots, values, axis=0, bc_type="natural")(frame)
     else:
         found = np.stack([np.interp(frame, knots, column) for column in values.T], axis=1)
     return found[:, :3], rotation.normalize(found[:, 3:].reshape(len(frame), -1, 4))

@@ -153,10 +153,11 @@ def lag_measures(dance: Dance, steps: Choreography, music_beat_s: Float) -> list
     the clip, against the music beat there. Steps that start on an added beat do not count.
     """
     is_heard = [np.min(np.abs(music_beat_s - s), initial=np.inf) < 1e-6 for s in steps.song_start_s]
-    lag_ms = [
-        1e3 * abs(_crossing_s(dance, int(i), steps.clip_start_s[i]) - steps.song_start_s[i])
-        for i in np.flatnonzero(is_heard)
+    crossed_s = [
+        _crossing_s(dance, i, float(c)) if heard else None
+        for i, (c, heard) in enumerate(zip(steps.clip_start_s, is_heard, strict=True))
     ]
+    lag_ms = [1e3 * abs(c - s) for c, s in zip(crossed_s, steps.song_start_s, strict=True) if c is not None]
     worst_ms = float(max(lag_ms, default=0.0))
     half_frame_ms = 500.0 / dance.frame_rate_hz
     return [
@@ -184,16 +185,14 @@ def warp_measures(steps: Choreography) -> list[Measure]:
 _SLACK = 1e-6
 
 
-def _crossing_s(dance: Dance, step: int, clip_s: float) -> float:
-    """Song time at which a step's clip passes a clip time, between the frames next to it; the step's frames only."""
-    frame = np.flatnonzero(dance.lineage.step_index == step)
-    if len(frame) == 0:
-        return float(np.inf)
+def _crossing_s(dance: Dance, step: int, clip_s: float) -> float | None:
+    """Song time at which a step's clip passes a clip time, by the frames of that step; None where it has too few."""
+    frame = np.flatnonzero(dance.lineage.step_index == step)[:2]
+    if len(frame) < 2:
+        return None
     time_s, passed_s = frame / dance.frame_rate_hz, dance.lineage.clip_time_s[frame]
-    if len(frame) == 1:
-        return float(time_s[0])
     slope = (passed_s[1] - passed_s[0]) / (time_s[1] - time_s[0])
-    return float(time_s[0] + (clip_s - passed_s[0]) / slope) if slope > 0 else float(time_s[0])
+    return float(time_s[0] + (clip_s - passed_s[0]) / slope) if slope > 0 else None
 
 
 def seam_measures(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from kernels.types import Choreography, Float
 
@@ -73,7 +73,7 @@ class Clock:
 
         A monotone cubic through the boundaries (Fritsch and Carlson, 1980), so that speed does not jump at a beat.
         """
-        cubic = PchipInterpolator(self.song_s, self.motion_s)
+        cubic = scipy.interpolate.PchipInterpolator(self.song_s, self.motion_s)
         inside = np.clip(time_s, self.song_s[0], self.song_s[-1])
         slope = np.where(time_s < self.song_s[0], cubic(self.song_s[0], 1), cubic(self.song_s[-1], 1))
         motion: Float = cubic(inside) + slope * (time_s - inside)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from kernels import rotation
 from kernels.types import Float, Int
@@ -171,8 +171,10 @@ def smooth(curve: Float, frame_rate_hz: float, cutoff_hz: float) -> Float:
     """
     if not 0 < cutoff_hz < 0.45 * frame_rate_hz or len(curve) < 5:
         return np.array(curve, np.float64)
-    sections = signal.butter(2, cutoff_hz, fs=frame_rate_hz, output="sos")
-    return np.asarray(signal.sosfiltfilt(sections, curve, padlen=min(len(curve) - 1, int(frame_rate_hz))), np.float64)
+    sections = scipy.signal.butter(2, cutoff_hz, fs=frame_rate_hz, output="sos")
+    return np.asarray(
+        scipy.signal.sosfiltfilt(sections, curve, padlen=min(len(curve) - 1, int(frame_rate_hz))), np.float64
+    )
 
 
 def find_extrema(curve: Float, frame_rate_hz: float, *, window_s: float = 2.0) -> Float:
@@ -197,11 +199,11 @@ def find_extrema(curve: Float, frame_rate_hz: float, *, window_s: float = 2.0) -
     if len(curve) < 5:
         return np.zeros(0)
     kernel = np.ones(min(max(int(window_s * frame_rate_hz) | 1, 3), 2 * len(curve) - 1))
-    count = signal.fftconvolve(np.ones(len(curve)), kernel, mode="same")
-    mean = signal.fftconvolve(curve, kernel, mode="same") / count
-    strength = np.sqrt(np.maximum(signal.fftconvolve((curve - mean) ** 2, kernel, mode="same") / count, 0.0))
+    count = scipy.signal.fftconvolve(np.ones(len(curve)), kernel, mode="same")
+    mean = scipy.signal.fftconvolve(curve, kernel, mode="same") / count
+    strength = np.sqrt(np.maximum(scipy.signal.fftconvolve((curve - mean) ** 2, kernel, mode="same") / count, 0.0))
     level = curve / np.maximum(strength, max(0.1 * float(strength.max()), 1e-9))
-    frame = np.sort(np.concatenate([signal.find_peaks(sign * level, prominence=0.5)[0] for sign in (1.0, -1.0)]))
+    frame = np.sort(np.concatenate([scipy.signal.find_peaks(sign * level, prominence=0.5)[0] for sign in (1.0, -1.0)]))
     before, here, after = curve[frame - 1], curve[frame], curve[frame + 1]
     bend = before - 2 * here + after
     shift = np.where(np.abs(bend) > 1e-12, 0.5 * (before - after) / np.where(bend == 0, 1.0, bend), 0.0)
@@ -236,12 +238,12 @@ def _spectral_peak(series: Float, frame_rate_hz: float, settings: BeatSettings) 
 
 def _autocorrelation_interval_s(curve: Float, frame_rate_hz: float, settings: BeatSettings) -> float:
     """Half the lag at which the curve most repeats itself: extrema come twice a cycle; 0 when it never does."""
-    level = signal.detrend(curve)
+    level = scipy.signal.detrend(curve)
     n = len(level)
-    raw = signal.correlate(level, level, mode="full", method="fft")[n - 1 :]
+    raw = scipy.signal.correlate(level, level, mode="full", method="fft")[n - 1 :]
     r = raw / np.maximum(np.arange(n, 0, -1), 1) / max(raw[0] / n, 1e-30)
     low, high = 2 * settings.shortest_extremum_s * frame_rate_hz, min(2 * settings.longest_s * frame_rate_hz, 0.75 * n)
-    peaks = signal.find_peaks(r)[0]
+    peaks = scipy.signal.find_peaks(r)[0]
     peaks = peaks[(peaks >= low) & (peaks <= high)]
     if len(peaks) == 0 or r[peaks].max() <= 0:
         return 0.0
@@ -354,7 +356,7 @@ def motion_beats(
     joint_m = position_m[:, chosen] - position_m[:, :1] if j > 1 else position_m
     if heading_rad is not None:
         joint_m = rotation.apply(rotation.from_heading(-heading_rad)[:, None], joint_m)
-    relative = joint_m.reshape(f, -1)
+    relative = joint_m.reshape(f, 3 * joint_m.shape[1])
     nothing = MotionBeats(np.zeros(0), 0.0, 0.0, 0.0, np.zeros(0), np.zeros(f))
     if f < 5:
         return nothing

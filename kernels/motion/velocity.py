@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from kernels.motion.beats import check_position
 from kernels.types import Float, Int
@@ -34,7 +34,7 @@ def mean_speed(position_m: Float, frame_rate_hz: float, *, smoothing_s: float = 
         return np.zeros(len(position_m))
     speed = np.linalg.norm(np.gradient(position_m, axis=0), axis=-1).mean(axis=-1) * frame_rate_hz
     if smoothing_s > 0:
-        speed = ndimage.gaussian_filter1d(speed, smoothing_s * frame_rate_hz, mode="nearest")
+        speed = scipy.ndimage.gaussian_filter1d(speed, smoothing_s * frame_rate_hz, mode="nearest")
     return np.asarray(speed, np.float64)
 
 
@@ -65,6 +65,37 @@ def kinematic_beats(position_m: Float, frame_rate_hz: float, *, smoothing_s: flo
         return np.zeros(0, np.int64)
     before, here, after = speed[:-2], speed[1:-1], speed[2:]
     return np.flatnonzero((here < before) & (here <= after)) + 1
+
+
+def accents(position_m: Float, frame_rate_hz: float, *, time_s: Float, sigma_s: float = 0.05) -> Float:
+    """Tell how plainly the body stops at given moments: 1 where speed is at its minimum, 0 far from any (ours).
+
+    A motion beat of the largest component is not always a moment a viewer sees as one; a choice of beats weighed by
+    this is.
+
+    Parameters
+    ----------
+    position_m : (F, J, 3) float, metres, world
+    frame_rate_hz : float, > 0
+    time_s : (B,) float, seconds from the first frame
+    sigma_s : float, seconds, > 0
+        A minimum this far away counts exp(-1/2).
+
+    Returns
+    -------
+    (B,) float64, 0 to 1
+        ``exp(-d^2 / 2 sigma^2)``, d to the nearest of :func:`kinematic_beats`; zeros when there are none.
+
+    Raises
+    ------
+    ValueError
+        As :func:`mean_speed`.
+    """
+    stop_s = kinematic_beats(position_m, frame_rate_hz) / frame_rate_hz
+    if len(stop_s) == 0 or len(time_s) == 0:
+        return np.zeros(len(time_s))
+    distance_s = np.abs(time_s[:, None] - stop_s).min(axis=1)
+    return np.asarray(np.exp(-(distance_s**2) / (2 * sigma_s**2)), np.float64)
 
 
 def jerk(position_m: Float, frame_rate_hz: float) -> Float:

@@ -1,0 +1,176 @@
+"""Motion beats: known tempo and phase, the octave question, and the refusals."""
+
+import numpy as np
+import pytest
+
+from kernels import rotation
+from kernels.motion.beats import BeatSettings, component_curve, find_extrema, motion_beats, smooth
+from kernels.synthetic.dancer import MOVES, place, take
+
+FRAME_S = 1 / 30
+DANCES = sorted(set(MOVES) - {"idle"})
+
+
+def swing(*, interval_s=0.5, rate_hz=30.0, first_s=0.1, duration_s=8.0, noise_m=0.0, seed=0):
+    """Three joints that turn on every beat, (F, 6, 3)."""
+    t = np.arange(int(duration_s * rate_hz)) / rate_hz
+    position = np.zeros((len(t), 6, 3))
+    position[:, :, 1] = 0.3 * np.arange(6)
+    turn = np.cos(np.pi * (t - first_s) / interval_s)
+    position[:, 3, 0] += 0.3 * turn
+    position[:, 4, 0] += 0.5 * turn
+    position[:, 5, 2] += 0.2 * turn
+    return position + noise_m * np.random.default_rng(seed).normal(size=position.shape)
+
+
+def worst_error_s(beats, interval_s, first_s):
+    """Distance of the worst beat from the known grid."""
+    number = np.round((beats.time_s - first_s) / interval_s)
+    return np.abs(beats.time_s - first_s - number * interval_s).max()
+
+
+@pytest.mark.parametrize("method", ["fft", "autocorrelation"])
+@pytest.mark.parametrize("rate_hz", [24.0, 30.0, 60.0, 120.0])
+@pytest.mark.parametrize("interval_s", [0.35, 0.5, 0.8])
+@pytest.mark.parametrize("noise_m", [0.0, 0.02])
+def test_swing_has_known_tempo_and_phase(method, rate_hz, interval_s, noise_m):
+    position = swing(interval_s=interval_s, rate_hz=rate_hz, noise_m=noise_m)
+    beats = motion_beats(position, rate_hz, settings=BeatSettings(method=method, extrema_per_beat=1))
+    assert beats.interval_s == pytest.approx(interval_s, rel=0.02)
+    assert worst_error_s(beats, interval_s, 0.1) <= FRAME_S
+
+
+@pytest.mark.parametrize("label", DANCES)
+@pytest.mark.parametrize("interval_s", [0.4, 0.5, 0.6])
+def test_made_up_dancer_is_heard_on_his_beats(label, interval_s):
+    made = take(label, interval_s=interval_s)
+    heading = rotation.heading_rad(made.clip.rotation_wxyz[:, 0])
+    beats = motion_beats(place(made), 30.0, heading_rad=heading)
+    assert beats.interval_s == pytest.approx(interval_s, rel=0.02)
+    assert worst_error_s(beats, interval_s, made.beat_s[0]) <= FRAME_S
+    assert beats.confidence > 0.5
+
+
+def test_every_extremum_or_every_second():
+    position = swing(interval_s=0.5)
+    every = motion_beats(position, 30.0, settings=BeatSettings(extrema_per_beat=1))
+    second = motion_beats(position, 30.0, settings=BeatSettings(extrema_per_beat=2))
+    assert second.interval_s == pytest.approx(2 * every.interval_s, rel=1e-6)
+    assert np.isin(np.round(second.time_s, 6), np.round(every.time_s, 6)).all()
+
+
+def test_bounce_beats_where_it_is_stopped_not_where_it_is_let_go():
+    t = np.arange(240) / 30
+    position = np.zeros((240, 3, 3))
+    position[:, 1:, 1] -= 0.3 * np.abs(np.sin(np.pi * (t - 0.1) / 0.5))[:, None]  # sharp on the beat, round between
+    beats = motion_beats(position, 30.0)
+    assert beats.interval_s == pytest.approx(0.5, rel=0.02)
+    assert worst_error_s(beats, 0.5, 0.1) <= FRAME_S
+
+
+def test_turning_dancer_needs_to_be_seen_from_the_body():
+    made = take("spin", interval_s=0.5)
+    literal = motion_beats(place(made), 30.0)
+    seen = motion_beats(place(made), 30.0, heading_rad=rotation.heading_rad(made.clip.rotation_wxyz[:, 0]))
+    assert seen.interval_s == pytest.approx(0.5, rel=0.02)
+    assert literal.interval_s != pytest.approx(0.5, rel=0.02)
+
+
+def test_second_component_and_joint_subset_follow_the_smaller_movement():
+    position = swing(interval_s=0.8)
+    t = np.arange(len(position)) / 30
+    position[:, 1, 2] += 0.15 * np.cos(np.pi * (t - 0.1) / 0.37)
+    assert motion_beats(position, 30.0).interval_s == pytest.approx(0.8, rel=0.02)
+    by_component = motion_beats(position, 30.0, settings=BeatSettings(component=2))
+    by_joint = motion_beats(position, 30.0, settings=BeatSettings(joints=(1,)))
+    assert by_component.interval_s == pytest.approx(0.37, rel=0.02)
+    assert by_joint.interval_s == pytest.approx(0.37, rel=0.02)
+
+
+def test_moving_and_turning_the_whole_clip_changes_nothing():
+    position = swing(noise_m=0.005)
+    q = rotation.from_heading(1.1)
+    moved = rotation.apply(q, position) + np.array([3.0, 0.0, -2.0])
+    a, b = motion_beats(position, 30.0), motion_beats(moved, 30.0)
+    np.testing.assert_allclose(a.time_s, b.time_s, atol=1e-6)
+
+
+def test_later_start_moves_beats_by_as_much():
+    position = swing(duration_s=9.0)
+    a, b = motion_beats(position[:240], 30.0), motion_beats(position[6:246], 30.0)
+    phase = (a.time_s[0] - b.time_s[0] - 6 / 30) / a.interval_s
+    assert abs(phase - round(phase)) < 0.02
+
+
+def test_confidence_falls_with_noise():
+    calm = motion_beats(swing(), 30.0)
+    noisy = motion_beats(swing(noise_m=0.1), 30.0)
+    assert calm.confidence > 0.9 > noisy.confidence
+
+
+def test_joined_curve_has_no_steps_between_windows():
+    position = swing(duration_s=12.0)
+    relative = (position - position[:, :1]).reshape(len(position), -1)
+    curve, share = component_curve(relative, 60, 1)
+    assert share == pytest.approx(1.0, abs=1e-9)
+    assert np.abs(np.diff(curve)).max() < 1.05 * np.pi / 0.5 / 30 * np.sqrt(0.3**2 + 0.5**2 + 0.2**2)
+
+
+@pytest.mark.parametrize("n_frames", [0, 1, 4, 7])
+def test_too_short_has_no_beats(n_frames):
+    beats = motion_beats(np.zeros((n_frames, 3, 3)), 30.0)
+    assert len(beats.time_s) == 0
+    assert beats.confidence == 0
+    assert len(beats.curve) == n_frames
+
+
+def test_standing_still_has_no_beats():
+    tremor = 0.001 * np.random.default_rng(1).normal(size=(300, 5, 3))
+    assert len(motion_beats(tremor, 30.0).time_s) == 0
+    assert len(motion_beats(place(take("idle")), 30.0).time_s) == 0
+
+
+def test_one_joint_is_its_own_root():
+    assert motion_beats(swing()[:, 4:5], 30.0).interval_s == pytest.approx(0.5, rel=0.02)
+
+
+def test_extrema_fall_between_frames():
+    t = np.arange(90) / 30
+    found_s = find_extrema(np.cos(np.pi * (t - 0.11) / 0.5), 30.0)
+    np.testing.assert_allclose(found_s, 0.61 + 0.5 * np.arange(len(found_s)), atol=2e-3)
+    assert len(found_s) >= 4
+
+
+def test_smoothing_has_no_lag_and_may_be_left_out():
+    t = np.arange(300) / 30
+    wave = np.sin(2 * np.pi * 0.5 * t)
+    np.testing.assert_allclose(smooth(wave, 30.0, 5.0)[30:-30], wave[30:-30], atol=0.01)
+    np.testing.assert_array_equal(smooth(wave, 30.0, 0.0), wave)
+
+
+@pytest.mark.parametrize(
+    ("position", "rate_hz", "word"),
+    [
+        (np.zeros((9, 3)), 30.0, "want \\(F, J, 3\\)"),
+        (np.full((9, 2, 3), np.nan), 30.0, "not finite"),
+        (np.zeros((9, 2, 3)), 0.0, "want > 0"),
+    ],
+)
+def test_refusals(position, rate_hz, word):
+    with pytest.raises(ValueError, match=word):
+        motion_beats(position, rate_hz)
+
+
+def test_refuses_a_joint_or_heading_that_does_not_fit():
+    with pytest.raises(ValueError, match="joints: want 0 to 5"):
+        motion_beats(swing(), 30.0, settings=BeatSettings(joints=(6,)))
+    with pytest.raises(ValueError, match="heading_rad"):
+        motion_beats(swing(), 30.0, heading_rad=np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"component": 0}, {"method": "guess"}, {"extrema_per_beat": 3}, {"shortest_s": 3.0}, {"window_s": 0.0}]
+)
+def test_settings_are_checked(wrong):
+    with pytest.raises(ValueError, match="want"):
+        BeatSettings(**wrong)
