@@ -233,11 +233,12 @@ def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> Take:
     root, local, translation = _poses_in_units(bvh, skeleton)
     some = np.unique(np.linspace(0, len(root) - 1, _MANY_FRAMES).astype(np.int64))
     moved = None if translation is None else translation[some]
-    position, _ = kinematics.forward(skeleton, root[some], local[some], translation_xyz_m=moved)
     try:
         mapping = naming.map_joints(skeleton, extra)
+        seen = [skeleton.index(mapping.joint[name]) for name in axes.LANDMARKS if name in mapping.joint]
     except naming.NoBodyError:
-        mapping = None
+        mapping, seen = None, list(range(len(skeleton.joints)))
+    position, _ = kinematics.forward_some(skeleton, root[some], local[some], seen, translation_xyz_m=moved)
     world = axes.infer_world(skeleton, mapping.joint if mapping is not None else None, position)
     if world.root_offset_rule == "add":
         root = root + skeleton.offset_xyz_m[0] * _has_channel(bvh, 0)

@@ -24,6 +24,7 @@ _UNITS: tuple[tuple[float, float, float], ...] = (
     (0.0254, 1.3, 2.2),
     (0.0254 / 0.45, 1.5, 1.95),
 )
+LANDMARKS = ("head", "leftFoot", "rightFoot", "leftToes", "rightToes", "leftHand", "rightHand")
 _UNITLESS_STATURE_M = 1.70
 _STATURE_IN_LEGS = canonical.BODY_HEIGHT_M / canonical.LEG_LENGTH_M
 
@@ -54,7 +55,7 @@ def infer_world(skeleton: Skeleton, joint: Mapping[str, str] | None, position: F
         In file units and axes, whatever its field's name says.
     joint : canonical name to the rig's name, or None where the rig is no body
     position : (F, J, 3) float, file units and axes, F >= 1
-        Poses with the root's channels in place of its offset.
+        Poses with the root's channels in place of its offset. Of a body, only the :data:`LANDMARKS` count.
 
     Returns
     -------
@@ -144,7 +145,7 @@ def _up_axis(skeleton: Skeleton, at: Mapping[str, int], position: Float, height:
     unsteady = {}
     for axis in "YZ":
         k = "XYZ".index(axis)
-        lowest = position[..., k].min(axis=1)
+        lowest = position[:, [at[name] for name in LANDMARKS if name in at], k].min(axis=1)
         offset = skeleton.offset_xyz_m[0, k]
         off_zero = min(abs(np.median(lowest)), abs(np.median(lowest) + offset))
         unsteady[axis] = float(np.std(lowest) + 0.2 * off_zero)

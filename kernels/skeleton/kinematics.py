@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from kernels import rotation
@@ -47,6 +49,44 @@ def forward(
         position[k] = position[parent] + rotation.apply(orientation[parent], offset)
         orientation[k] = rotation.mul(orientation[parent], local[k])
     return np.moveaxis(position, 0, 1).copy(), np.moveaxis(orientation, 0, 1).copy()
+
+
+def forward_some(
+    skeleton: Skeleton,
+    root_xyz_m: Float,
+    rotation_wxyz: Float,
+    joints: Iterable[int],
+    *,
+    translation_xyz_m: Float | None = None,
+) -> tuple[Float, Float]:
+    """Place some joints in the world, and all above them: :func:`forward` where the rest does not matter.
+
+    Parameters
+    ----------
+    skeleton, root_xyz_m, rotation_wxyz, translation_xyz_m : as :func:`forward`
+    joints : indices
+
+    Returns
+    -------
+    position_xyz_m : (F, J, 3) float64, metres, world
+    orientation_wxyz : (F, J, 4) float64, unit, world
+        Zero for joints that are neither asked for nor above one that is.
+    """
+    f, j = len(root_xyz_m), len(skeleton.joints)
+    needed = {0}
+    for joint in joints:
+        k = int(joint)
+        while k not in needed:
+            needed.add(k)
+            k = int(skeleton.parent[k])
+    position, orientation = np.zeros((j, f, 3)), np.zeros((j, f, 4))
+    position[0], orientation[0] = root_xyz_m, rotation_wxyz[:, 0]
+    for k in sorted(needed - {0}):
+        parent = skeleton.parent[k]
+        offset = skeleton.offset_xyz_m[k] if translation_xyz_m is None else translation_xyz_m[:, k]
+        position[k] = position[parent] + rotation.apply(orientation[parent], offset)
+        orientation[k] = rotation.mul(orientation[parent], rotation_wxyz[:, k])
+    return np.moveaxis(position, 0, 1), np.moveaxis(orientation, 0, 1)
 
 
 def place(clip: Clip) -> tuple[Float, Float]:

@@ -156,23 +156,31 @@ def _user_joints(skeleton: Skeleton, extra: Mapping[str, str]) -> dict[str, str]
 
 def _by_name(skeleton: Skeleton, user: dict[str, str]) -> tuple[dict[str, str] | None, str]:
     """Joints of the family that knows most of the rig's names; None when none knows all that are required."""
+    known = [(family, dict(joint) | user) for family, joint in _by_family(skeleton.joints)]
+    for family, joint in sorted(known, key=lambda one: -len(one[1])):
+        if _is_body(skeleton, _add_ends(skeleton, joint)):
+            return joint, "user" if len(joint) == len(user) else family
+    return None, "user"
+
+
+@lru_cache(maxsize=64)
+def _by_family(names: tuple[str, ...]) -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
+    """List what each family of names knows of a rig: its joints by canonical name, in pairs."""
     known: dict[tuple[str, str], str] = {}
-    shared = _shared_prefix(skeleton.joints)
-    for name in skeleton.joints:
+    shared = _shared_prefix(names)
+    for name in names:
         known.setdefault(side_and_part(name[len(shared) :]), name)
-    best: dict[str, str] | None = None
-    best_family = "user"
-    for family, names in _FAMILIES.items():
-        joint = dict(user)
-        for part, spellings in names.items():
+    marked = next((family for family, mark in _MARKS.items() if any(mark.match(name) for name in names)), None)
+    found = []
+    for family, parts in _FAMILIES.items():
+        joint = {}
+        for part, spellings in parts.items():
             for side in ("",) if part in ("hips", "head") else ("left", "right"):
-                found = next((known[side, spelling] for spelling in spellings if (side, spelling) in known), None)
-                if found is not None:
-                    joint.setdefault(side + part, found)
-        if (best is None or len(joint) > len(best)) and _is_body(skeleton, _add_ends(skeleton, joint)):
-            best, best_family = joint, "user" if len(joint) == len(user) else family
-    marked = (family for family, mark in _MARKS.items() if any(mark.match(name) for name in skeleton.joints))
-    return best, next(marked, best_family) if best is not None and best_family != "user" else best_family
+                spelling = next((one for one in spellings if (side, one) in known), None)
+                if spelling is not None:
+                    joint[side + part] = known[side, spelling]
+        found.append((marked or family, tuple(joint.items())))
+    return tuple(found)
 
 
 @lru_cache(maxsize=4096)

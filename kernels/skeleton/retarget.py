@@ -129,17 +129,9 @@ def _place(clip: Clip, mapping: JointMapping) -> Rig:
     if missing:
         raise ValueError(f"mapping: want joints of the clip's rig, got {', '.join(missing)}")
     at = {name: skeleton.joints.index(source) for name, source in mapping.joint.items()}
-    needed = {k for joint in at.values() for k in topology.path_up(skeleton, joint)}
-    f, j = clip.n_frames, len(skeleton.joints)
-    position, orientation = np.zeros((j, f, 3)), np.zeros((j, f, 4))
-    local = np.ascontiguousarray(np.moveaxis(clip.rotation_wxyz, 1, 0), np.float64)
-    position[0], orientation[0] = clip.root_xyz_m, local[0]
-    for k in sorted(needed - {0}):
-        parent = skeleton.parent[k]
-        moved = clip.translation_xyz_m
-        offset = skeleton.offset_xyz_m[k] if moved is None else moved[:, k]
-        position[k] = position[parent] + rotation.apply(orientation[parent], offset)
-        orientation[k] = rotation.mul(orientation[parent], local[k])
+    position, orientation = kinematics.forward_some(
+        skeleton, clip.root_xyz_m, clip.rotation_wxyz, at.values(), translation_xyz_m=clip.translation_xyz_m
+    )
     spine, neck = topology.trunk(skeleton, mapping.joint)
     return Rig(
         clip=clip,
@@ -147,8 +139,8 @@ def _place(clip: Clip, mapping: JointMapping) -> Rig:
         spine=spine,
         neck=neck,
         rest=alignment.rest_position(clip),
-        position=np.moveaxis(position, 0, 1),
-        orientation=np.moveaxis(orientation, 0, 1),
+        position=position,
+        orientation=orientation,
     )
 
 
