@@ -204,11 +204,17 @@ def find_extrema(curve: Float, frame_rate_hz: float, *, window_s: float = 2.0) -
     strength = np.sqrt(np.maximum(scipy.signal.fftconvolve((curve - mean) ** 2, kernel, mode="same") / count, 0.0))
     level = curve / np.maximum(strength, max(0.1 * float(strength.max()), 1e-9))
     frame = np.sort(np.concatenate([scipy.signal.find_peaks(sign * level, prominence=0.5)[0] for sign in (1.0, -1.0)]))
+    # Strength that changes along the curve moves the turns of the quotient by a frame at most: go back to the curve's.
+    frame = np.clip(frame + np.round(np.clip(_vertex(curve, frame), -1, 1)).astype(np.int64), 1, len(curve) - 2)
+    extremum_s: Float = (frame + np.clip(_vertex(curve, frame), -0.5, 0.5)) / frame_rate_hz
+    return extremum_s
+
+
+def _vertex(curve: Float, frame: Int) -> Float:
+    """Where the parabola through a frame and its neighbours turns, in frames from it; 0 where they lie on a line."""
     before, here, after = curve[frame - 1], curve[frame], curve[frame + 1]
     bend = before - 2 * here + after
-    shift = np.where(np.abs(bend) > 1e-12, 0.5 * (before - after) / np.where(bend == 0, 1.0, bend), 0.0)
-    extremum_s: Float = (frame + np.clip(shift, -0.5, 0.5)) / frame_rate_hz
-    return extremum_s
+    return np.where(np.abs(bend) > 1e-12, 0.5 * (before - after) / np.where(bend == 0, 1.0, bend), 0.0)
 
 
 def _cosines(extremum: Float, n_frames: int) -> Float:
