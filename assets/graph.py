@@ -16,7 +16,7 @@ from kernels.graph.distance import PairDistance, concatenate
 from kernels.graph.features import BeatFeatures, beat_features
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
-from kernels.graph.transitions import THRESHOLD, Transitions, find_transitions
+from kernels.graph.transitions import Transitions, find_transitions
 from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float, MotionGraph
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
@@ -69,7 +69,7 @@ def motion_graph(
         _together(beats, settings),
         nodes,
         distance=pair_distance,
-        threshold=settings.threshold or THRESHOLD,
+        threshold=settings.threshold or None,
         n_nearest=settings.neighbours,
     )
     losses = {name: prune(found.graph) for name, prune in PRUNE.items()}

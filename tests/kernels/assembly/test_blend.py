@@ -1,0 +1,145 @@
+"""Assembly: exact playing, seams that carry place and heading, lineage of every frame."""
+
+import numpy as np
+import pytest
+
+from kernels import rotation
+from kernels.assembly.blend import assemble, ease, sample, turn
+from kernels.skeleton import kinematics
+from kernels.skeleton.canonical import CANONICAL
+from kernels.types import Clip
+
+
+def dance(steps, clips, *, rate_hz=30.0):
+    return assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=rate_hz, duration_s=float(steps.song_end_s[-1]))
+
+
+def test_one_clip_at_its_own_pace_is_the_clip(clips, phrases):
+    steps = phrases(("step", 0.0, 8, 0.5, 0.5))
+    made = dance(steps, clips)
+    source, _ = kinematics.place(clips["step"])
+    n = len(made.root_xyz_m)
+    assert n == 121
+    shift = made.position_xyz_m[0, 0] - source[0, 0]
+    np.testing.assert_allclose(made.position_xyz_m, source[:n] + shift, atol=1e-9)
+
+
+def test_starts_at_the_origin_facing_z(clips, phrases):
+    made = dance(phrases(("twist", 0.5, 4, 0.55, 0.55)), clips)
+    np.testing.assert_allclose(made.root_xyz_m[0, [0, 2]], 0, atol=1e-12)
+    assert float(rotation.heading_rad(made.rotation_wxyz[0, 0])) == pytest.approx(0, abs=1e-9)
+
+
+def test_every_boundary_falls_on_its_song_time(clips, phrases):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.46), ("twist", 0.8, 6, 0.55, 0.52), ("wave", 0.75, 6, 0.5, 0.55))
+    made = dance(steps, clips, rate_hz=100.0)
+    for i in range(len(steps.clip_id)):
+        frame = round(float(steps.song_start_s[i]) * 100)
+        if abs(frame / 100 - steps.song_start_s[i]) < 1e-9:
+            assert made.lineage.clip_time_s[frame] == pytest.approx(steps.clip_start_s[i], abs=1e-6)
+
+
+def test_place_and_heading_go_on_over_a_seam(clips, phrases):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("twist", 0.8, 6, 0.55, 0.5), ("rock", 1.25, 6, 0.5, 0.5))
+    made = dance(steps, clips, rate_hz=60.0)
+    jump = np.linalg.norm(np.diff(made.root_xyz_m[:, [0, 2]], axis=0), axis=1)
+    turn_rad = np.abs(np.angle(np.exp(1j * np.diff(rotation.heading_rad(made.rotation_wxyz[:, 0])))))
+    for frame in (180, 360):
+        assert jump[frame - 12 : frame + 12].max() < 2.0 / 60
+        assert turn_rad[frame - 12 : frame + 12].max() < 4.0 / 60
+
+
+def test_seam_inside_one_continuous_clip_leaves_no_trace(clips, phrases):
+    whole = dance(phrases(("step", 0.25, 12, 0.5, 0.5)), clips)
+    seamed = dance(phrases(("step", 0.25, 6, 0.5, 0.5), ("step", 3.25, 6, 0.5, 0.5)), clips)
+    np.testing.assert_allclose(seamed.position_xyz_m, whole.position_xyz_m, atol=1e-6)
+
+
+def test_halfway_on_the_seam(clips, phrases):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("wave", 0.75, 6, 0.5, 0.5))
+    made = dance(steps, clips)
+    line = made.lineage
+    seam = 90
+    assert line.step_index[seam - 1] == 5
+    assert line.step_index[seam] == 6
+    assert line.blend_weight[seam] == pytest.approx(0.5)
+    assert line.blend_step_index[seam] == 5
+    assert line.blend_step_index[seam - 1] == 6
+    both = np.flatnonzero(line.blend_step_index >= 0)
+    assert both.tolist() == list(range(86, 95))
+    assert (line.blend_weight[both] > 0).all()
+    assert (np.delete(line.blend_weight, both) == 0).all()
+    assert np.isnan(np.delete(line.blend_time_s, both)).all()
+
+
+def test_lineage_names_the_times_that_are_shown(clips, phrases):
+    steps = phrases(("step", 0.25, 4, 0.5, 0.45), ("wave", 0.75, 4, 0.5, 0.55))
+    made = dance(steps, clips)
+    alone = np.flatnonzero(made.lineage.blend_step_index < 0)
+    for frame in alone[::7]:
+        clip = clips[steps.clip_id[made.lineage.step_index[frame]]]
+        _, q = sample(clip, made.lineage.clip_time_s[frame : frame + 1])
+        shown = made.rotation_wxyz[frame, 1:]
+        assert rotation.angle_between(shown, q[0, 1:]).max() < 1e-6
+
+
+def test_blend_of_different_poses_is_between_them(clips, phrases):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("wave", 0.75, 6, 0.5, 0.5))
+    made = dance(steps, clips)
+    cut = dance(phrases(("step", 0.25, 6, 0.5, 0.5), ("wave", 0.75, 6, 0.5, 0.5), blend_s=0.0), clips)
+    speed = np.linalg.norm(np.diff(made.position_xyz_m, axis=0), axis=-1).max(axis=1)
+    cut_speed = np.linalg.norm(np.diff(cut.position_xyz_m, axis=0), axis=-1).max(axis=1)
+    assert speed[80:100].max() < 0.5 * cut_speed[80:100].max()
+
+
+def test_frames_cover_the_song_at_any_rate(clips, phrases):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5))
+    for rate_hz, n in ((24.0, 73), (30.0, 91), (59.94, 180), (120.0, 361)):
+        made = dance(steps, clips, rate_hz=rate_hz)
+        assert len(made.root_xyz_m) == n
+        assert np.linalg.norm(made.rotation_wxyz, axis=-1) == pytest.approx(1.0)
+
+
+def test_faster_output_is_the_same_motion(clips, phrases):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.47), ("rock", 0.75, 6, 0.5, 0.53))
+    slow, fast = dance(steps, clips, rate_hz=30.0), dance(steps, clips, rate_hz=60.0)
+    np.testing.assert_allclose(slow.position_xyz_m, fast.position_xyz_m[::2][: len(slow.position_xyz_m)], atol=1e-9)
+
+
+def test_sample_between_frames_of_a_smooth_motion(clips):
+    fine = clips["rock"]
+    coarse = Clip(CANONICAL, 30.0, fine.root_xyz_m[::2], fine.rotation_wxyz[::2])
+    t = np.arange(20, 300) / 60
+    a, b = sample(fine, t), sample(coarse, t)
+    assert np.abs(a[0] - b[0]).max() < 2e-3
+    assert rotation.angle_between(a[1], b[1]).max() < 0.02
+
+
+def test_sample_holds_beyond_the_ends_and_takes_short_clips(clips):
+    clip = clips["step"]
+    root, _ = sample(clip, np.array([-1.0, 99.0]))
+    np.testing.assert_allclose(root, clip.root_xyz_m[[0, -1]], atol=1e-12)
+    one = Clip(CANONICAL, 30.0, clip.root_xyz_m[:1], clip.rotation_wxyz[:1])
+    np.testing.assert_allclose(sample(one, np.array([0.0, 0.3]))[0], clip.root_xyz_m[[0, 0]])
+    assert sample(clip, np.zeros(0))[1].shape == (0, 22, 4)
+
+
+def test_turning_a_motion_turns_its_world(clips):
+    clip = clips["twist"]
+    root, q = turn(clip.root_xyz_m, clip.rotation_wxyz, 0.7)
+    turned, _ = kinematics.forward(CANONICAL, root, q)
+    source, _ = kinematics.place(clip)
+    np.testing.assert_allclose(turned, rotation.apply(rotation.from_heading(0.7), source), atol=1e-12)
+
+
+def test_ease_rises_without_slope_at_its_ends():
+    np.testing.assert_allclose(ease(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])), [0, 0, 0.5, 1, 1])
+    assert ease(np.array([0.01]))[0] < 4e-4
+
+
+def test_refusals(clips, phrases):
+    steps = phrases(("step", 0.25, 2, 0.5, 0.5))
+    with pytest.raises(ValueError, match="step missing"):
+        assemble(steps, {}, skeleton=CANONICAL, frame_rate_hz=30.0, duration_s=1.0)
+    with pytest.raises(ValueError, match="want > 0"):
+        assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=0.0, duration_s=1.0)
