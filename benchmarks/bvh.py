@@ -22,8 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-REPOSITORY = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(REPOSITORY))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from assets.formats import bvh
 from kernels.skeleton.retarget import retarget
@@ -42,7 +41,7 @@ def made_up_files(folder: Path) -> list[Path]:
 
 def real_folders() -> list[Path]:
     """List the folders of real dances and labelled takes that there are."""
-    data = Path(os.environ.get("ODORI_TEST_DATA", REPOSITORY.parent / "shared" / "data"))
+    data = Path(os.environ.get("ODORI_TEST_DATA", Path(__file__).resolve().parents[2] / "shared" / "data"))
     return [folder for folder in (data / "bvh_dance", data / "bvh_labelled") if folder.is_dir()]
 
 
@@ -93,10 +92,9 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--json", action="store_true")
     arguments = parser.parse_args()
+    paths = arguments.paths or real_folders()
     with tempfile.TemporaryDirectory() as folder:
-        found = [
-            file for path in arguments.paths for file in (sorted(path.rglob("*.bvh")) if path.is_dir() else [path])
-        ]
+        found = [file for path in paths for file in (sorted(path.rglob("*.bvh")) if path.is_dir() else [path])]
         figures = measure(found or made_up_files(Path(folder)), arguments.repeats)
     if arguments.json:
         print(json.dumps(figures))
