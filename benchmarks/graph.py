@@ -30,8 +30,8 @@ import pyopencl as cl
 
 from kernels import rotation
 from kernels.graph import prune
-from kernels.graph.distance import Metric, concatenate, pose_distance
-from kernels.graph.features import BeatFeatures, beat_features, default_weight
+from kernels.graph.distance import Metric, pose_distance
+from kernels.graph.features import BeatFeatures, beat_features, concatenate_beats, default_weight
 from kernels.graph.nodes import BeatNodes, beat_nodes
 from kernels.graph.path import find_path
 from kernels.graph.transitions import N_NEAREST, connect, nearest
@@ -71,9 +71,7 @@ def made_up_catalogue(n_nodes: int, metric: Metric) -> tuple[BeatFeatures, BeatN
         spent_s += time.perf_counter() - begin
         beats.append(beat_s)
         lengths.append((len(turned) - 1) / 60)
-    pose = concatenate(part.pose for part in features)
-    local = np.concatenate([part.local_distance for part in features])
-    return BeatFeatures(pose, local), beat_nodes(beats, lengths), spent_s
+    return concatenate_beats(features), beat_nodes(beats, lengths), spent_s
 
 
 def pair_by_pair(poses: list[tuple[Float, Float]], n_pairs: int) -> float:

@@ -24,8 +24,9 @@ class PathCosts:
         A step of warp ratio r (song time ÷ clip time) costs ``warp · (ln r / ln 1.1)²``; outside the soft bounds
         ``leaving + warp_outside · e`` more, e = 0 at the soft bound and 1 at the hard one, linear in ln r and beyond.
     soft_ratio, hard_ratio : (low, high), 0 < low < 1 < high
-        Inside the soft bounds a warp is hardly seen. Outside the hard ones a step is used only where nothing else
-        reaches the last beat.
+        Inside the soft bounds a warp is hardly seen; leaving them costs as much as several seams, so that it happens
+        only where the catalogue has nothing near the song's tempo. Outside the hard bounds a step is used only where
+        nothing else reaches the last beat.
     last_resort_ratio : (low, high)
         Outside these a step is never used.
     stride : float, >= 0
@@ -46,8 +47,8 @@ class PathCosts:
     transition: float = 1.0
     transition_scale: float | None = None
     warp: float = 0.1
-    leaving: float = 2.0
-    warp_outside: float = 4.0
+    leaving: float = 8.0
+    warp_outside: float = 8.0
     soft_ratio: tuple[float, float] = (0.90, 1.10)
     hard_ratio: tuple[float, float] = (0.80, 1.25)
     last_resort_ratio: tuple[float, float] = (0.4, 2.5)

@@ -9,17 +9,22 @@ are interpolated linearly, rotations by slerp, so clips of 24 and of 240 frames 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from kernels import rotation
-from kernels.graph.distance import Metric, PoseFeatures, check_metric, paired_distance
+from kernels.graph.distance import Metric, PoseFeatures, check_metric, concatenate, paired_distance
+from kernels.motion.velocity import jerk
 from kernels.skeleton.canonical import JOINTS, LEG_LENGTH_M
 from kernels.types import Float
 
 STEP_S = 1 / 30
 """Half-width of the central difference of a velocity, and the offset of the frames before and after a beat, seconds."""
+
+JERK_REACH_S = 0.2
+"""How far around a beat the recording's own jerk counts, seconds: half a usual blend."""
 
 VELOCITY_TIME_S = 0.1
 """Default time constant of velocities, seconds: a mismatch of 1 m/s counts as much as one of 0.1 m."""
@@ -66,21 +71,51 @@ class BeatFeatures:
     pose : PoseFeatures of N beats
     local_distance : (N,) float64, in the metric's unit squared, >= 0
         d(i) of equation 19: how far the pose moves across the beat.
+    jerk_ratio : (N,) float64, >= 0, or None where it is not known
+        How rough the recording itself is around the beat: 1 is the 99th percentile of its clip.
 
     Raises
     ------
     ValueError
-        If the lengths differ or a distance is not finite and >= 0.
+        If the lengths differ or a value is not finite and >= 0.
     """
 
     pose: PoseFeatures
     local_distance: Float
+    jerk_ratio: Float | None = None
 
     def __post_init__(self) -> None:
-        if self.local_distance.shape != (len(self.pose),):
-            raise ValueError(f"local_distance: want ({len(self.pose)},), got {self.local_distance.shape}")
-        if not (np.isfinite(self.local_distance).all() and (self.local_distance >= 0).all()):
-            raise ValueError("local_distance: want finite, >= 0")
+        for name in ("local_distance", "jerk_ratio"):
+            value = getattr(self, name)
+            if value is not None and value.shape != (len(self.pose),):
+                raise ValueError(f"{name}: want ({len(self.pose)},), got {value.shape}")
+            if value is not None and not (np.isfinite(value).all() and (value >= 0).all()):
+                raise ValueError(f"{name}: want finite, >= 0")
+
+
+def concatenate_beats(parts: Iterable[BeatFeatures]) -> BeatFeatures:
+    """Stack the beats of several clips.
+
+    Parameters
+    ----------
+    parts : at least one, all made alike
+
+    Returns
+    -------
+    BeatFeatures of all rows, in order; ``jerk_ratio`` is None where one part's is
+
+    Raises
+    ------
+    ValueError
+        If there is no part, or two were made differently.
+    """
+    parts = list(parts)
+    known = [part.jerk_ratio for part in parts if part.jerk_ratio is not None]
+    return BeatFeatures(
+        concatenate(part.pose for part in parts),
+        np.concatenate([part.local_distance for part in parts]),
+        np.concatenate(known) if len(known) == len(parts) else None,
+    )
 
 
 def beat_features(
@@ -133,6 +168,9 @@ def beat_features(
     a clip at 120 Hz would look sixteen times stiller than the same clip at 30 Hz, and hardly connect. Near an end the
     two instants are shifted inwards, keeping their spacing. At an extremum of motion the two poses nearly agree; the
     velocities, which turn there, keep d(i) from vanishing.
+
+    ``jerk_ratio`` is the largest jerk of any joint within 0.2 s of the beat over the 99th percentile in the clip. Where
+    a recording jumps, d(i) is large and equation 19 would draw seams to the jump; this tells such beats apart.
     """
     check_metric(metric)
     rotation_wxyz = np.asarray(rotation_wxyz, np.float64)
@@ -166,7 +204,19 @@ def beat_features(
         return make(clip, np.clip(at_s, 0.0, duration_s), scaled, velocity_time_s)
 
     middle = np.clip(time_s, min(STEP_S, duration_s / 2), max(duration_s - STEP_S, duration_s / 2))
-    return BeatFeatures(features(time_s), paired_distance(features(middle - STEP_S), features(middle + STEP_S)))
+    local = paired_distance(features(middle - STEP_S), features(middle + STEP_S))
+    return BeatFeatures(features(time_s), local, _jerk_ratio(position_xyz_m, frame_rate_hz, time_s))
+
+
+def _jerk_ratio(position_xyz_m: Float, frame_rate_hz: float, time_s: Float) -> Float:
+    """Peak jerk within reach of each moment over the clip's 99th percentile; 0 where the clip has none."""
+    found = jerk(position_xyz_m, frame_rate_hz)
+    usual = float(np.percentile(found[1:-2], 99)) if len(found) >= 4 else 0.0
+    if usual == 0:
+        return np.zeros(len(time_s))
+    first = np.maximum(np.floor((time_s - JERK_REACH_S) * frame_rate_hz).astype(np.int64), 0)
+    last = np.ceil((time_s + JERK_REACH_S) * frame_rate_hz).astype(np.int64)
+    return np.array([found[a : b + 1].max() for a, b in zip(first, last, strict=True)]).reshape(-1) / usual
 
 
 @dataclass(frozen=True, eq=False)

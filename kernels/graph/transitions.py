@@ -9,6 +9,9 @@ the edges; it is cheap and looks at no pose.
 *Rule of the blend.* The blend of a transition i → j is centred on the beat: half of it needs frames of i's clip after
 i, half of it frames of j's clip before j. Both must be at least ``min_margin_s``. Only edges a dance can use are made:
 i must have a beat before it (it is danced to), j one after it (it is danced from).
+
+*Rule of the jump.* No seam where a recording itself jerks by more than ``max_jerk_ratio`` times its clip's 99th
+percentile: a large d(i) there would make the ratio of equation 19 small with everything.
 """
 
 from __future__ import annotations
@@ -41,6 +44,9 @@ MIN_MARGIN_S = 0.2
 """Half of a blend of 0.4 s."""
 RAISE = 1.25
 
+MAX_JERK_RATIO = 1.5
+"""What a finished seam may have: no blend makes a rougher recording pass."""
+
 THRESHOLD = 2.0
 THRESHOLDS: dict[Metric, float] = {"position": THRESHOLD, "rotation": 1.0}
 """Default TH of equation 19. On real clips, seams of larger weight show as jerks (docs/motion-graph.md)."""
@@ -65,7 +71,9 @@ class Nearest:
     weight : (P,) float64, d(row, other) / (d(row) + d(other)): equation 20
     metric : "position" or "rotation"
     min_margin_s : float, seconds
-        What the rows were made with: nearer pairs that only this margin forbids are listed beside the k nearest.
+    is_smooth : (N,) bool, of all nodes
+        What the rows were made with: nearer pairs that only the rules of blend and jump forbid are listed beside the k
+        nearest.
     """
 
     row: Int
@@ -74,6 +82,7 @@ class Nearest:
     weight: Float
     metric: Metric
     min_margin_s: float
+    is_smooth: Mask
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +96,8 @@ class Transitions:
     threshold_asked, threshold_used : float
         They differ where no dance could have gone on for ever with the threshold asked.
     is_endless : bool, whether a dance can go on for ever
-    n_margin_removed : int, edges within the threshold that only the missing frames for a blend forbid
+    n_margin_removed : int, edges within the threshold that missing frames for a blend forbid
+    n_jerk_removed : int, edges within the threshold that only a jump in a recording forbids
     """
 
     graph: MotionGraph
@@ -96,6 +106,7 @@ class Transitions:
     threshold_used: float
     is_endless: bool
     n_margin_removed: int
+    n_jerk_removed: int
 
 
 def find_transitions(
@@ -107,6 +118,7 @@ def find_transitions(
     n_nearest: int = N_NEAREST,
     guard_s: float = GUARD_S,
     min_margin_s: float = MIN_MARGIN_S,
+    max_jerk_ratio: float = MAX_JERK_RATIO,
     local_bounds: tuple[float, float] | None = None,
 ) -> Transitions:
     """Make the motion graph of all beats: :func:`nearest`, then :func:`connect`; arguments and errors are theirs."""
@@ -117,6 +129,7 @@ def find_transitions(
         n_nearest=n_nearest,
         guard_s=guard_s,
         min_margin_s=min_margin_s,
+        max_jerk_ratio=max_jerk_ratio,
         local_bounds=local_bounds,
     )
     return connect(nodes, pairs, threshold=threshold)
@@ -131,6 +144,7 @@ def nearest(
     n_nearest: int = N_NEAREST,
     guard_s: float = GUARD_S,
     min_margin_s: float = MIN_MARGIN_S,
+    max_jerk_ratio: float = MAX_JERK_RATIO,
     local_bounds: tuple[float, float] | None = None,
 ) -> Nearest:
     """List the k nearest nodes of each node by equation 20, whatever their weight.
@@ -147,6 +161,8 @@ def nearest(
         Nodes of the same clip nearer in time than this are the same moment, never a transition; nor is the next beat.
     min_margin_s : float, seconds, >= 0
         Frames a transition needs before and after it (module docstring).
+    max_jerk_ratio : float, > 0
+        Roughness of the recording up to which a beat may be a seam (module docstring); counts where it is known.
     local_bounds : (low, high), 0 < low <= high, in the metric's unit squared, or None for :data:`LOCAL_BOUNDS`
         Every d(i) is brought within these.
 
@@ -173,16 +189,20 @@ def nearest(
     for name, value in (("guard_s", guard_s), ("min_margin_s", min_margin_s)):
         if not (np.isfinite(value) and value >= 0):
             raise ValueError(f"{name}: want finite, >= 0, got {value}")
+    if not max_jerk_ratio > 0:
+        raise ValueError(f"max_jerk_ratio: want > 0, got {max_jerk_ratio}")
     low, high = LOCAL_BOUNDS[features.pose.metric] if local_bounds is None else local_bounds
     if not (np.isfinite(high) and 0 < low <= high):
         raise ValueError(f"local_bounds: want 0 < low <= high, finite, got {(low, high)}")
     rows = np.arange(len(nodes)) if rows is None else np.asarray(rows, np.int64)
     local = np.clip(features.local_distance, low, high)
-    search = _Search(features, local, nodes, distance, n_nearest, guard_s, min_margin_s)
+    roughness = features.jerk_ratio
+    smooth = np.ones(len(nodes), bool) if roughness is None else roughness <= max_jerk_ratio
+    search = _Search(features, local, nodes, distance, n_nearest, guard_s, min_margin_s, smooth)
     parts = list(search.tiles(rows))
     row, other, apart, weight = (np.concatenate([part[i] for part in parts]) for i in range(4))
     order = np.lexsort((other, weight, row))
-    return Nearest(row[order], other[order], apart[order], weight[order], features.pose.metric, min_margin_s)
+    return Nearest(row[order], other[order], apart[order], weight[order], features.pose.metric, min_margin_s, smooth)
 
 
 def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float | None = None) -> Transitions:
@@ -215,35 +235,36 @@ def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float | None = None)
     threshold = THRESHOLDS[pairs.metric] if threshold is None else threshold
     if not (np.isfinite(threshold) and threshold > 0):
         raise ValueError(f"threshold: want finite, > 0, got {threshold}")
-    used = threshold
-    graph, apart, n_removed = _join(nodes, pairs, used)
-    endless = has_endless_dance(graph)
-    largest = float(pairs.weight.max(initial=0.0))
-    while not endless and used <= largest:
-        used = used * RAISE
-        graph, apart, n_removed = _join(nodes, pairs, used)
-        endless = has_endless_dance(graph)
-    if not endless:
-        used = threshold
-        graph, apart, n_removed = _join(nodes, pairs, used)
-    return Transitions(graph, apart, threshold, used, endless, n_removed)
+    asked = found = _join(nodes, pairs, threshold, threshold)
+    while not found.is_endless and found.threshold_used <= pairs.weight.max(initial=0.0):
+        found = _join(nodes, pairs, threshold, found.threshold_used * RAISE)
+    return found if found.is_endless else asked
 
 
-def _join(nodes: BeatNodes, pairs: Nearest, threshold: float) -> tuple[MotionGraph, Float, int]:
-    """Edges of the pairs below a threshold, their distances, and how many the margin forbids."""
+def _join(nodes: BeatNodes, pairs: Nearest, asked: float, used: float) -> Transitions:
+    """Make the edges of the pairs below a threshold."""
     n = max(len(nodes), 1)
-    near = pairs.weight < threshold
+    near = pairs.weight < used
     row, other = pairs.row[near], pairs.other[near]
     source, target = np.concatenate([row, other]), np.concatenate([other, row])
     _, first = np.unique(source * n + target, return_index=True)
     source, target = source[first], target[first]
     apart, weight = np.tile(pairs.distance[near], 2)[first], np.tile(pairs.weight[near], 2)[first]
     useful = nodes.may_leave()[source] & nodes.may_enter()[target] & (nodes.next_node[source] != target)
-    allowed = nodes.may_leave(pairs.min_margin_s)[source] & nodes.may_enter(pairs.min_margin_s)[target]
-    edge = np.flatnonzero(useful & allowed)
+    roomy = nodes.may_leave(pairs.min_margin_s)[source] & nodes.may_enter(pairs.min_margin_s)[target]
+    smooth = pairs.is_smooth[source] & pairs.is_smooth[target]
+    edge = np.flatnonzero(useful & roomy & smooth)
     edge = edge[np.lexsort((target[edge], weight[edge], source[edge]))]
     graph = MotionGraph(nodes.clip_index, nodes.time_s, nodes.next_node, source[edge], target[edge], weight[edge])
-    return graph, apart[edge], int((useful & ~allowed).sum())
+    return Transitions(
+        graph=graph,
+        distance=apart[edge],
+        threshold_asked=asked,
+        threshold_used=used,
+        is_endless=has_endless_dance(graph),
+        n_margin_removed=int((useful & ~roomy).sum()),
+        n_jerk_removed=int((useful & roomy & ~smooth).sum()),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,13 +278,14 @@ class _Search:
     n_nearest: int
     guard_s: float
     min_margin_s: float
+    is_smooth: Mask
 
     def tiles(self, rows: Int) -> Iterator[_Pairs]:
         """Yield the listed pairs, a tile of rows at a time; first an empty one, so that there is always one."""
         nothing = np.zeros(0, np.int64)
         yield nothing, nothing, np.zeros(0), np.zeros(0)
         nodes, margin = self.nodes, self.min_margin_s
-        leaves, enters = nodes.may_leave(margin), nodes.may_enter(margin)
+        leaves, enters = nodes.may_leave(margin) & self.is_smooth, nodes.may_enter(margin) & self.is_smooth
         first, last = nodes.same_moment(self.guard_s)
         for group, useful, allowed, step in (
             (rows[leaves[rows]], nodes.may_enter(), enters, nodes.next_node),

@@ -3,7 +3,7 @@ import pytest
 
 from kernels import rotation
 from kernels.graph.distance import paired_distance, pose_distance
-from kernels.graph.features import STEP_S, BeatFeatures, beat_features, default_weight
+from kernels.graph.features import STEP_S, BeatFeatures, beat_features, concatenate_beats, default_weight
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.kinematics import forward
 
@@ -136,6 +136,38 @@ def test_default_weights(metric):
     assert weight["leftToes"] < 0.2 * weight["hips"]
 
 
+def test_a_jump_in_the_recording_is_told_at_the_beats_within_reach_of_it(make_dance):
+    q, p = make_dance(30.0, 20.0)
+    p[300, 9] += [0.3, 0.0, 0.0]  # one wrist, one frame, at 10 s
+    time_s = np.array([5.0, 9.6, 9.9, 10.0, 10.15, 10.4])
+    ratio = beat_features(q, p, frame_rate_hz=30, time_s=time_s).jerk_ratio
+    np.testing.assert_array_equal(ratio > 1.5, [False, False, True, True, True, False])
+    assert ratio[0] <= 1
+
+
+def test_roughness_is_of_the_clip_whatever_its_rate_and_size(make_dance):
+    time_s = np.array([0.7, 2.0, 3.3])
+    q, p = make_dance(120.0)
+    one = beat_features(q, p, frame_rate_hz=120, time_s=time_s).jerk_ratio
+    np.testing.assert_allclose(beat_features(q, 3 * p, frame_rate_hz=120, time_s=time_s).jerk_ratio, one, rtol=1e-6)
+    np.testing.assert_allclose(
+        beat_features(q, p, frame_rate_hz=60, time_s=2 * time_s).jerk_ratio.max(), one.max(), rtol=0.1
+    )
+    still = beat_features(q[:3], p[:3], frame_rate_hz=30, time_s=np.array([0.0]))
+    np.testing.assert_array_equal(still.jerk_ratio, 0)
+
+
+def test_beats_of_clips_in_a_row(make_dance):
+    parts = [beat_features(*make_dance(30.0), frame_rate_hz=30, time_s=np.array(t)) for t in ([0.5, 1.0], [], [2.0])]
+    whole = concatenate_beats(iter(parts))
+    assert len(whole.pose) == len(whole.local_distance) == len(whole.jerk_ratio) == 3
+    assert whole.jerk_ratio[2] == parts[2].jerk_ratio[0]
+    unknown = BeatFeatures(parts[0].pose, parts[0].local_distance)
+    assert concatenate_beats([unknown, parts[2]]).jerk_ratio is None
+    with pytest.raises(ValueError, match="at least one"):
+        concatenate_beats([])
+
+
 def test_errors(make_dance):
     q, p = make_dance()
     good = {"frame_rate_hz": 120.0, "time_s": np.array([1.0])}
@@ -159,3 +191,5 @@ def test_errors(make_dance):
         BeatFeatures(pose, np.zeros(2))
     with pytest.raises(ValueError, match="local_distance"):
         BeatFeatures(pose, np.array([-1.0]))
+    with pytest.raises(ValueError, match="jerk_ratio"):
+        BeatFeatures(pose, np.ones(1), np.array([np.nan]))

@@ -5,8 +5,8 @@ import pytest
 
 from assets.formats import bvh
 from kernels import rotation
-from kernels.graph.distance import concatenate, paired_distance, pose_distance
-from kernels.graph.features import BeatFeatures, beat_features
+from kernels.graph.distance import paired_distance, pose_distance
+from kernels.graph.features import beat_features, concatenate_beats
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.path import find_path
 from kernels.graph.prune import keep_endless, keep_strongest
@@ -32,8 +32,7 @@ def salsa(data_dir):
 
 def catalogue(clips, metric):
     parts = [beat_features(q, p, frame_rate_hz=hz, time_s=t, metric=metric) for q, p, hz, t in clips]
-    features = BeatFeatures(concatenate(f.pose for f in parts), np.concatenate([f.local_distance for f in parts]))
-    return features, beat_nodes([t for *_, t in clips], [(len(q) - 1) / hz for q, _, hz, _ in clips])
+    return concatenate_beats(parts), beat_nodes([t for *_, t in clips], [(len(q) - 1) / hz for q, _, hz, _ in clips])
 
 
 @pytest.mark.parametrize("metric", ["position", "rotation"])

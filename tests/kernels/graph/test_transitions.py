@@ -125,6 +125,26 @@ def test_rule_of_the_blend(on_a_line):
     assert without.n_margin_removed == 0
 
 
+def test_rule_of_the_jump(on_a_line):
+    features, nodes = on_a_line([[0, 1, 0, 1], [0, 1, 0, 1]])
+    jump = np.where(np.arange(8) == 5, 2.0, 1.0)
+    rough = BeatFeatures(features.pose, features.local_distance, jump)
+    free, ruled = find_transitions(features, nodes), find_transitions(rough, nodes)
+    assert (1, 5) in edges(free)
+    assert edges(ruled) == [(s, t) for s, t in edges(free) if 5 not in (s, t)]
+    assert (free.n_jerk_removed, ruled.n_jerk_removed) == (0, len(edges(free)) - len(edges(ruled)))
+    assert edges(find_transitions(rough, nodes, max_jerk_ratio=2.0)) == edges(free)
+
+
+def test_forbidden_nodes_take_no_place_among_the_nearest(on_a_line):
+    features, nodes = on_a_line([[9, 0, 9], [9, 0.1, 9], [9, 0.2, 9]])
+    rough = BeatFeatures(features.pose, features.local_distance, np.where(np.arange(9) == 4, 2.0, 1.0))
+    pairs = nearest(rough, nodes, n_nearest=1)
+    np.testing.assert_array_equal(pairs.other[pairs.row == 1], [4, 7])
+    assert (1, 7) in edges(connect(nodes, pairs))
+    assert (1, 4) not in edges(connect(nodes, pairs))
+
+
 def test_a_transition_is_left_after_a_beat_and_entered_before_one(on_a_line):
     features, nodes = on_a_line([[0, 0, 0], [0, 0, 0]])
     for source, target in edges(find_transitions(features, nodes)):
@@ -239,6 +259,7 @@ def test_errors(on_a_line):
         ({"min_margin_s": np.nan}, "min_margin_s"),
         ({"local_bounds": (0.0, 1.0)}, "local_bounds"),
         ({"local_bounds": (2.0, 1.0)}, "local_bounds"),
+        ({"max_jerk_ratio": 0.0}, "max_jerk_ratio"),
         ({"threshold": 0.0}, "threshold"),
     ]:
         with pytest.raises(ValueError, match=message):
