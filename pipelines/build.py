@@ -9,7 +9,6 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import dagster as dg
 
@@ -240,12 +239,12 @@ def open_instance(studio: StudioFolder) -> dg.DagsterInstance:
     StudioError
         If the folder cannot be written to.
     """
-    home = Path(os.environ.setdefault("DAGSTER_HOME", str(studio.root / ".dagster")))
+    home = studio.dagster_home
     try:
         home.mkdir(parents=True, exist_ok=True)
         configuration = home / "dagster.yaml"
         if not configuration.exists():
             configuration.write_text(_CONFIGURATION)
-        return dg.DagsterInstance.get()
+        return dg.DagsterInstance.from_config(str(home))
     except OSError as error:
         raise StudioError(f"{home}: cannot be written: {why(error)}") from error

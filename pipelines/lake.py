@@ -120,6 +120,7 @@ LONGEST_ROW_GROUPS = 4096
 _WHY: Mapping[int, str] = {
     errno.ENOSPC: "the disk is full; free some space and run it again",
     errno.EDQUOT: "the disk quota is used up; free some space and run it again",
+    errno.EFBIG: "the disk does not take a file this large; free some space and run it again",
     errno.EROFS: "the disk is read-only; name a studio that can be written to",
     errno.EACCES: "writing is not allowed there; mend the folder's permissions",
     errno.EPERM: "writing is not allowed there; mend the folder's permissions",

@@ -69,6 +69,11 @@ class StudioFolder:
         write_beside(self.root / "lake" / "request" / f"{key}.json", lambda file: file.write(text.encode()))
 
     @property
+    def dagster_home(self) -> Path:
+        """Folder of Dagster's own storage: ``$DAGSTER_HOME``, else inside the studio."""
+        return Path(os.environ.get("DAGSTER_HOME", self.root / ".dagster"))
+
+    @property
     def dances(self) -> Path:
         """Folder of the finished stages."""
         return self.root / "dances"

@@ -20,7 +20,7 @@ def serve(root: Path, *, host: str, port: int) -> int:
     """Serve until interrupted or until one of the two ends; exit status."""
     studio = existing(root)
     open_instance(studio)
-    environment = os.environ | {"ODORI_STUDIO": str(studio.root), "DAGSTER_DISABLE_TELEMETRY": "yes"}
+    environment = os.environ | {"ODORI_STUDIO": str(studio.root), "DAGSTER_HOME": str(studio.dagster_home.absolute())}
     module = ["-m", "pipelines.definitions"]
     commands = (
         [sys.executable, "-m", "dagster_webserver", "-h", host, "-p", str(port), *module],
