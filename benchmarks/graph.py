@@ -171,11 +171,11 @@ def whole_graph(metric: Metric, n_nodes: int, device: str | None) -> dict[str, f
 
 
 def random_graph(n_nodes: int) -> MotionGraph:
-    """Clips of twenty beats at 92 to 150 a minute, every node with about 20 transitions anywhere, both ways."""
+    """Clips of twenty beats at 92 to 150 a minute, a node with 20 transitions or more on average, both ways."""
     rng = np.random.default_rng(0)
     interval_s = rng.uniform(0.40, 0.65, n_nodes // BEATS_A_CLIP)
     nodes = beat_nodes([0.2 + t * np.arange(BEATS_A_CLIP) for t in interval_s], list(0.4 + BEATS_A_CLIP * interval_s))
-    one = np.repeat(np.arange(len(nodes)), N_NEAREST // 2)
+    one = np.repeat(np.arange(len(nodes)), N_NEAREST // 2 + 2)  # some are not useful
     other, weight = rng.integers(0, len(nodes), len(one)), rng.uniform(0.1, 2, len(one))
     source, target = np.concatenate([one, other]), np.concatenate([other, one])
     useful = nodes.may_leave()[source] & nodes.may_enter()[target] & (source != target)
