@@ -38,11 +38,11 @@ class PoseDistance:
     def __init__(self, context: cl.Context) -> None:
         if len(context.devices) != 1:
             raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
-        self._context = context
+        self.context = context
         self._device = context.devices[0]
         # twice the preferred width hides the latency of the loads; a GPU says 1 and gets the smallest
-        preferred = self._device.preferred_vector_width_float
-        self._lanes = max(width for width in _LANES if width <= max(2 * preferred, _LANES[0]))
+        most = max(2 * self._device.preferred_vector_width_float, _LANES[0])
+        self._lanes = max(width for width in _LANES if width <= most)
         source = resources.files("kernels.opencl").joinpath("pose_distance.cl").read_text(encoding="utf-8")
         options = ["-D", f"ROWS={_ROWS}", "-D", f"LANES={self._lanes}"]
         self._program = cl.Program(context, source).build(options=options)
@@ -108,7 +108,7 @@ class PoseDistance:
     ) -> None:
         """Compute one tile into a view of the answer."""
         (row_linear, row_quaternion, height), (column_linear, column_quaternion, width) = row, column
-        answer = cl.Buffer(self._context, cl.mem_flags.WRITE_ONLY, size=4 * height * width)
+        answer = cl.Buffer(self.context, cl.mem_flags.WRITE_ONLY, size=4 * height * width)
         size = (_up(width // self._lanes, self._group[0]), _up(height // _ROWS, self._group[1]))
         counts = (like.linear.shape[1], len(like.quaternion_weight), height, width)
         kernel = cl.Kernel(
@@ -139,7 +139,7 @@ class PoseDistance:
     def _buffer(self, array: NDArray[np.float32]) -> cl.Buffer:
         """Copy to the device; one unused number where there is nothing, for a buffer may not be empty."""
         content = array if array.size else np.zeros(1, np.float32)
-        return cl.Buffer(self._context, cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR, hostbuf=content)
+        return cl.Buffer(self.context, cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR, hostbuf=content)
 
 
 def _up(count: int, block: int) -> int:

@@ -71,6 +71,15 @@ def test_a_pair_has_the_same_bits_in_any_portion(twin, make_poses, metric, monke
     np.testing.assert_array_equal(twin(poses, poses), whole)
 
 
+@pytest.mark.parametrize("metric", METRICS)
+def test_the_vector_width_does_not_change_a_bit(twin, make_poses, metric, monkeypatch):
+    poses = make_poses(37, metric)
+    whole = twin(poses, poses)
+    for lanes in (4, 8, 16):
+        monkeypatch.setattr(module, "_LANES", (lanes,))
+        np.testing.assert_array_equal(PoseDistance(twin.context)(poses, poses), whole)
+
+
 def test_right_at_small_and_large_angles(twin):
     angle = np.concatenate([np.geomspace(1e-4, 1, 50), np.linspace(1, np.pi, 50)])
     q = np.stack([np.cos(angle / 2), np.sin(angle / 2), 0 * angle, 0 * angle], -1)[:, None]
