@@ -115,6 +115,11 @@ def neutral_orientations(rig: Rig) -> dict[int, Float]:
     dict
         Joint index to (4,) float64, for the joints in ``rig.at`` and all of the spine and neck.
 
+    Raises
+    ------
+    ValueError
+        If both hips, both shoulders, or hips and neck are in one place: such a body has no sides or no up.
+
     Notes
     -----
     From a human rest pose: each bone is swung, by the shortest arc and parents first, to where it is in the canonical
@@ -122,8 +127,21 @@ def neutral_orientations(rig: Rig) -> dict[int, Float]:
     cross) says nothing about twist: there the axis about which the elbow or knee bends, seen from the joint and
     averaged over the clip, is brought to the canonical one, and joints without such an axis are untwisted on average.
     """
+    for what, a, b in (
+        ("hips", rig.at["leftUpperLeg"], rig.at["rightUpperLeg"]),
+        ("shoulders", rig.at["leftUpperArm"], rig.at["rightUpperArm"]),
+        ("hips and neck", rig.at["hips"], rig.neck[0]),
+    ):
+        if _is_nothing(rig, a, b):
+            raise ValueError(f"joints: want {what} apart, got them in one place; check the joint mapping")
     body = _body_turn(rig)
     return _from_motion(rig) if body is None else _from_rest(rig, body)
+
+
+def _is_nothing(rig: Rig, a: int, b: int) -> bool:
+    """Whether two joints are in one place at some frame: no direction leads from one to the other."""
+    way = rig.position[:, b] - rig.position[:, a]
+    return bool((np.sum(way * way, axis=-1) < 1e-12).any())
 
 
 def _square(primary: Float, secondary: Float) -> Float:
@@ -265,19 +283,17 @@ def _from_motion(rig: Rig) -> dict[int, Float]:
 
     hips = at["hips"]
     trunk = P[:, rig.neck[0]] - P[:, hips]
-    first = next((k for k in rig.spine if np.linalg.norm(rig.rest[k] - rig.rest[hips]) > 1e-6), rig.neck[0])
+    first = next((k for k in rig.spine if not _is_nothing(rig, hips, k)), rig.neck[0])
     settle(hips, hip_line, P[:, first] - P[:, hips], (X, Y))
     last = hips
     for i, (a, b) in enumerate(zip(rig.spine, [*rig.spine[1:], rig.neck[0]], strict=True), 1):
-        bone = P[:, b] - P[:, a]
-        if np.linalg.norm(rig.rest[b] - rig.rest[a]) < 1e-6:
-            bone = trunk
+        bone = trunk if _is_nothing(rig, a, b) else P[:, b] - P[:, a]
         share = i / len(rig.spine)
         settle(a, bone, unit((1 - share) * hip_line + share * arm_line), (Y, X))
         last = a
     chest = last
     for a, b in pairwise(rig.neck):
-        settle(a, P[:, b] - P[:, a], arm_line, (Y, X))
+        settle(a, trunk if _is_nothing(rig, a, b) else P[:, b] - P[:, a], arm_line, (Y, X))
         last = a
     follow(rig.neck[-1], last)
     for side in SIDES:
@@ -286,8 +302,9 @@ def _from_motion(rig: Rig) -> dict[int, Float]:
             chain = [side + part for part in limb if side + part in at]
             for name, child in zip(chain, [*chain[1:], None], strict=True):
                 k = at[name]
-                if child is None:
+                if child is None or _is_nothing(rig, k, at[child]):
                     follow(k, last)
+                    last = k
                     continue
                 bone = P[:, at[child]] - P[:, k]
                 direction, axis = bone_direction(name), Y if name.endswith("Shoulder") else X

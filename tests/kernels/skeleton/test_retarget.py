@@ -227,3 +227,21 @@ def test_mappings_that_do_not_fit(step):
     flat = Skeleton(JOINTS, CANONICAL.parent, 0.0 * CANONICAL.offset_xyz_m)
     with pytest.raises(ValueError, match="thighs and shins of some length"):
         retarget(Clip(flat, 30.0, step.root_xyz_m, step.rotation_wxyz), naming.JointMapping(joint, "user"))
+
+
+@pytest.mark.parametrize("axes", [{}, rigs.along_bones()], ids=["t-pose", "along bones"])
+@pytest.mark.parametrize("bone", ["leftHand", "rightLowerArm", "chest", "neck", "head", "leftToes", "leftUpperArm"])
+def test_bones_of_no_length(step, axes, bone):
+    ours = bring_back(rigs.author(step, rigs.RigPlan(axes=axes, stretch={bone: 0.0})))
+    assert np.isfinite(ours.rotation_wxyz).all()
+    legs = [k for k, name in enumerate(JOINTS) if name.endswith(("UpperLeg", "LowerLeg", "Foot"))]
+    np.testing.assert_allclose(ours.position_xyz_m[:, legs], kinematics.place(step)[0][:, legs], atol=0.02)
+
+
+def test_bodies_without_sides_or_up(step):
+    narrow = rigs.RigPlan(stretch={"leftUpperLeg": 0.0, "rightUpperLeg": 0.0})
+    with pytest.raises(ValueError, match="want hips apart"):
+        bring_back(rigs.author(step, narrow))
+    flat = rigs.RigPlan(stretch=dict.fromkeys(("spine", "chest", "upperChest", "neck"), 0.0))
+    with pytest.raises(ValueError, match="want hips and neck apart"):
+        bring_back(rigs.author(step, flat))
