@@ -19,7 +19,7 @@ from assets.formats.bvh_header import parse_header
 from assets.formats.bvh_values import parse_values
 from assets.formats.errors import FormatError
 from kernels import rotation
-from kernels.skeleton import axes, kinematics, naming
+from kernels.skeleton import alignment, axes, kinematics, naming
 from kernels.types import Clip, Float, Int, Skeleton
 
 MAX_BYTES = 1 << 30
@@ -227,7 +227,8 @@ def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> Take:
     Raises
     ------
     ValueError
-        If scale channels are not all 1, or the user's table names what is no canonical joint.
+        If scale channels are not all 1, the user's table names what is no canonical joint, or the body has no sides, no
+        up or no legs.
     """
     skeleton = _skeleton_in_units(bvh)
     root, local, translation = _poses_in_units(bvh, skeleton)
@@ -235,10 +236,12 @@ def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> Take:
     moved = None if translation is None else translation[some]
     try:
         mapping = naming.map_joints(skeleton, extra)
-        seen = [skeleton.index(mapping.joint[name]) for name in axes.LANDMARKS if name in mapping.joint]
+        at = {name: skeleton.index(joint) for name, joint in mapping.joint.items()}
     except naming.NoBodyError:
-        mapping, seen = None, list(range(len(skeleton.joints)))
-    position, _ = kinematics.forward_some(skeleton, root[some], local[some], seen, translation_xyz_m=moved)
+        mapping, at = None, {name: k for k, name in enumerate(skeleton.joints)}
+    position, _ = kinematics.forward_some(skeleton, root[some], local[some], at.values(), translation_xyz_m=moved)
+    if mapping is not None:
+        alignment.check_body(at, position)
     world = axes.infer_world(skeleton, mapping.joint if mapping is not None else None, position)
     if world.root_offset_rule == "add":
         root = root + skeleton.offset_xyz_m[0] * _has_channel(bvh, 0)

@@ -102,23 +102,41 @@ def rest_position(clip: Clip) -> Float:
     return position
 
 
+def check_body(at: Mapping[str, int], position: Float) -> None:
+    """Refuse a body that has no sides, no up or no legs.
+
+    Parameters
+    ----------
+    at : canonical name to joint index, with the required joints
+    position : (F, J, 3) float, metres, world, F >= 1
+        Of those joints at least, in all or some frames.
+
+    Raises
+    ------
+    ValueError
+        If both hips, both shoulders, hips and neck, or the ends of a thigh or shin are usually in one place.
+    """
+    pairs = [("leftUpperLeg", "rightUpperLeg"), ("leftUpperArm", "rightUpperArm")]
+    pairs += [("hips", "neck" if "neck" in at else "head")]
+    pairs += [(side + a, side + b) for side in SIDES for a, b in pairwise(topology.LEG[:3])]
+    for a, b in pairs:
+        apart_m = float(np.median(np.linalg.norm(position[:, at[b]] - position[:, at[a]], axis=-1)))
+        if not apart_m > 1e-6:
+            raise ValueError(f"joints: want {a} and {b} apart, got them in one place; check the joint mapping")
+
+
 def neutral_orientations(rig: Rig) -> dict[int, Float]:
     """Find the neutral orientation of each joint that drives the body.
 
     Parameters
     ----------
     rig : Rig
-        Of at least one frame.
+        Of at least one frame, passed by :func:`check_body`.
 
     Returns
     -------
     dict
         Joint index to (4,) float64, for the joints in ``rig.at`` and all of the spine and neck.
-
-    Raises
-    ------
-    ValueError
-        If both hips, both shoulders, or hips and neck are in one place: such a body has no sides or no up.
 
     Notes
     -----
@@ -127,13 +145,6 @@ def neutral_orientations(rig: Rig) -> dict[int, Float]:
     cross) says nothing about twist: there the axis about which the elbow or knee bends, seen from the joint and
     averaged over the clip, is brought to the canonical one, and joints without such an axis are untwisted on average.
     """
-    for what, a, b in (
-        ("hips", rig.at["leftUpperLeg"], rig.at["rightUpperLeg"]),
-        ("shoulders", rig.at["leftUpperArm"], rig.at["rightUpperArm"]),
-        ("hips and neck", rig.at["hips"], rig.neck[0]),
-    ):
-        if _is_nothing(rig, a, b):
-            raise ValueError(f"joints: want {what} apart, got them in one place; check the joint mapping")
     body = _body_turn(rig)
     return _from_motion(rig) if body is None else _from_rest(rig, body)
 

@@ -69,7 +69,8 @@ def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.Give | None =
     Raises
     ------
     ValueError
-        If the mapping names a joint the rig does not have, or the legs have no length.
+        If the mapping names a joint the rig does not have, or the body has no sides, no up or no legs
+        (:func:`kernels.skeleton.alignment.check_body`).
 
     Notes
     -----
@@ -85,6 +86,7 @@ def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.Give | None =
         none = np.zeros((0, 2, 3))
         contacts = find_contacts(none, none, frame_rate_hz=clip.frame_rate_hz)
         return CanonicalMotion(np.zeros((0, 3)), np.zeros((0, 22, 4)), np.zeros((0, 22, 3)), 1.0, contacts)
+    alignment.check_body(rig.at, rig.position)
     scale = LEG_LENGTH_M / _leg_length_m(rig)
     ankle = scale * rig.position[:, [rig.at[side + "Foot"] for side in SIDES]]
     toes = scale * rig.position[:, [rig.at.get(side + "Toes", rig.at[side + "Foot"]) for side in SIDES]]
@@ -151,8 +153,6 @@ def _leg_length_m(rig: Rig) -> float:
         for a, b in (("UpperLeg", "LowerLeg"), ("LowerLeg", "Foot")):
             bone = rig.position[:, rig.at[side + b]] - rig.position[:, rig.at[side + a]]
             length += float(np.median(np.linalg.norm(bone, axis=-1))) / 2
-    if not length > 1e-6:
-        raise ValueError("legs: want thighs and shins of some length, got none; check the joint mapping")
     return length
 
 
