@@ -66,9 +66,15 @@ _FAMILIES: dict[str, dict[str, tuple[str, ...]]] = {
     "rokoko": _family("hips/hip head", "shoulder arm/upperarm forearm/lowerarm hand", "thigh/upleg shin/leg foot toe"),
     "xsens": _family("pelvis/hips head", "shoulder upperarm forearm hand", "upperleg lowerleg foot toe/toebase"),
     "mvn": _family(
-        "hips/hip head", "collar/clavicle shoulder elbow wrist/hand", "hip knee ankle/foot toe/toes/toebase"
+        "hips/hip/root head",
+        "collar/clavicle/scapula shoulder elbow wrist/hand",
+        "hip knee ankle/foot toe/toes/toebase",
     ),
-    "cgspeed": _family("hip/hips head", "collar shldr/shoulder forearm hand", "thigh shin foot toe/toes"),
+    "cgspeed": _family(
+        "hip/hips head",
+        "collar shldr/shldrbend/shoulder forearm/forearmbend hand",
+        "thigh/thighbend shin foot toe/toes",
+    ),
     "cmu": _family("root head", "clavicle humerus radius hand/wrist", "femur tibia foot toes"),
     "smpl": _family(
         "pelvis/hips/spinebase/hipcenter head", "collar/clavicle shoulder elbow wrist", "hip knee ankle foot"
@@ -79,7 +85,7 @@ _FAMILIES: dict[str, dict[str, tuple[str, ...]]] = {
         "thigh/upperleg shin/lowerleg/calf foot toe/toes",
     ),
     "unreal": _family("pelvis head", "clavicle upperarm lowerarm hand", "thigh calf foot ball/toe"),
-    "biped": _family("pelvis head", "clavicle upperarm forearm hand", "thigh calf foot toe0/toe"),
+    "biped": _family("pelvis/hip head", "clavicle upperarm forearm hand", "thigh calf foot toe0/toebase/toe"),
     "optitrack": _family("hip/hips head", "shoulder uarm farm hand", "thigh shin foot toe"),
     "mmd": _family("下半身/腰 頭", "肩 腕 ひじ/肘 手首", "足 ひざ/膝 足首 つま先/足先ex"),
 }
@@ -95,6 +101,7 @@ _PREFIX = re.compile(
 )
 _SIDES = {"left": "left", "l": "left", "lft": "left", "左": "left"}
 _SIDES |= {"right": "right", "r": "right", "rgt": "right", "右": "right"}
+_CENTRES = ("m", "mid", "c")
 _VOCABULARY = frozenset(name for family in _FAMILIES.values() for names in family.values() for name in names)
 
 
@@ -197,6 +204,8 @@ def side_and_part(name: str) -> tuple[str, str]:
         if len(words) > 1 and words[at] in _SIDES:
             side = _SIDES[words.pop(at)]
             return side, "".join(words)
+        if len(words) > 1 and words[at] in _CENTRES:
+            words.pop(at)
     joined = "".join(words)
     for prefix in ("left", "right", "l", "r"):
         rest = joined.removeprefix(prefix)

@@ -111,6 +111,24 @@ STUDIOS = {
         ["下半身", "上半身", "上半身1", "上半身2", "首", "頭"],
         *([side + part for part in ("肩", "腕", "ひじ", "手首", "足", "ひざ", "足首", "つま先")] for side in "左右"),
     ),
+    "daz": both(
+        "hip abdomenLower chestLower chestUpper neckLower head",
+        "{s}Collar {s}ShldrBend {s}ForearmBend {s}Hand {s}ThighBend {s}Shin {s}Foot {s}Toe",
+    ),
+    "character creator": both(
+        "CC_Base_Hip CC_Base_Waist CC_Base_Spine01 CC_Base_Spine02 CC_Base_NeckTwist01 CC_Base_Head",
+        " ".join(
+            "CC_Base_{S}_" + s for s in ("Clavicle", "Upperarm", "Forearm", "Hand", "Thigh", "Calf", "Foot", "ToeBase")
+        ),
+    ),
+    "advanced skeleton": both(
+        "Root_M Spine1_M Spine2_M Chest_M Neck_M Head_M",
+        "Scapula_{S} Shoulder_{S} Elbow_{S} Wrist_{S} Hip_{S} Knee_{S} Ankle_{S} Toes_{S}",
+    ),
+    "smplx": both(
+        "pelvis spine1 spine2 spine3 neck head",
+        "{side}_collar {side}_shoulder {side}_elbow {side}_wrist {side}_hip {side}_knee {side}_ankle {side}_foot",
+    ),
     "shouted": both(
         "HIPS SPINE CHEST UPPERCHEST NECK HEAD",
         "{S}_SHOULDER {S}_UPPERARM {S}_LOWERARM {S}_HAND {S}_UPPERLEG {S}_LOWERLEG {S}_FOOT {S}_TOES",
@@ -223,6 +241,8 @@ def test_names_that_do_not_hang_together_are_not_believed():
         ("root", "", "root"),
         ("Ribs", "", "ribs"),
         ("L", "", "l"),
+        ("Head_M", "", "head"),
+        ("C_Spine", "", "spine"),
         ("Hips#2", "", "hips2"),
         ("Left Hand", "left", "hand"),
     ],
