@@ -58,6 +58,7 @@ on 99 beats of 100: it would be near to everything."""
 
 _TILE = 2**22
 _CHUNK = 2**13
+_CROWD = 2**20
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,28 +307,36 @@ class _Search:
         _exclude(weight, excluded)
         cut = self._cut(weight[:, allowed], self.local[row])
         r, c = np.nonzero((weight <= cut[:, None]) & np.isfinite(weight))
-        if apart.dtype == np.float64:
-            distance = apart[r, c].astype(np.float64)
-        else:
-            crowded = np.bincount(r, minlength=len(row)) > 4 * self.n_nearest + 256
-            calm = ~crowded[r]
-            r, c = r[calm], c[calm]
-            distance = self._paired(row[r], column[c])
-            for i in np.flatnonzero(crowded):  # poses frozen alike by the hundred: whole rows by the reference
-                exact = pose_distance(self.features.pose.take(row[i : i + 1]), poses)
-                ratio = exact / (self.local[row[i]] + self.local[column])
-                _exclude(ratio, excluded[i : i + 1])
-                order = np.argsort(ratio[0], kind="stable")
-                order = order[np.isfinite(ratio[0, order])]
-                order = order[np.cumsum(allowed[order]) - allowed[order] < self.n_nearest]
-                r, c = np.append(r, np.full(len(order), i)), np.append(c, order)
-                distance = np.append(distance, exact[0, order])
+        crowded = np.bincount(r, minlength=len(row)) > 4 * self.n_nearest + 256
+        r, c = r[~crowded[r]], c[~crowded[r]]
+        is_exact = apart.dtype == np.float64
+        distance = apart[r, c].astype(np.float64) if is_exact else self._paired(row[r], column[c])
+        parts = [(r, c, distance)]
+        most = max(_CROWD // len(column), 1)
+        for block in np.split(np.flatnonzero(crowded), np.arange(most, int(crowded.sum()), most)):
+            exact = apart[block] if is_exact else pose_distance(self.features.pose.take(row[block]), poses)
+            parts += self._crowd(block, row[block], column, exact.astype(np.float64), allowed, excluded[block])
+        r, c, distance = (np.concatenate([part[i] for part in parts]) for i in range(3))
         ratio = distance / (self.local[row[r]] + self.local[column[c]])
         order = np.lexsort((c, ratio, r))
         r, c, distance, ratio = r[order], c[order], distance[order], ratio[order]
         listed = _rank(r, np.ones(len(r), bool)) < self.n_nearest
         listed |= (_rank(r, allowed[c]) < self.n_nearest) & allowed[c]
         return row[r[listed]], column[c[listed]], distance[listed], ratio[listed]
+
+    def _crowd(
+        self, block: Int, row: Int, column: Int, exact: Float, allowed: Mask, excluded: Int
+    ) -> list[tuple[Int, Int, Float]]:
+        """Nearest columns of rows that have hundreds equally near, as poses frozen alike are."""
+        ratio = exact / np.add.outer(self.local[row], self.local[column])
+        _exclude(ratio, excluded)
+        found = []
+        for i, r in enumerate(block):
+            order = np.argsort(ratio[i], kind="stable")
+            order = order[np.isfinite(ratio[i, order])]
+            order = order[np.cumsum(allowed[order]) - allowed[order] < self.n_nearest]
+            found.append((np.full(len(order), r), order, exact[i, order]))
+        return found
 
     def _cut(self, weight: NDArray[np.floating], local: Float) -> Float:
         """Weight up to which a pair may be among the k nearest of its row, given the backend's error."""

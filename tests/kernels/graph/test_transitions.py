@@ -221,11 +221,14 @@ def test_backends_agree_to_the_bit(make_catalogue, metric, monkeypatch):
         np.testing.assert_array_equal(getattr(device, name), getattr(reference, name))
 
 
-def test_frozen_alike_by_the_hundred(on_a_line):
-    features, nodes = on_a_line([np.zeros(200), np.zeros(200)], local=0.0)
-    pairs = nearest(features, nodes, distance=in_float32, n_nearest=3)
+@pytest.mark.parametrize("distance", [pose_distance, in_float32])
+def test_frozen_alike_by_the_hundred(on_a_line, distance, monkeypatch):
+    monkeypatch.setattr(transitions, "_CROWD", 1000)  # several blocks
+    features, nodes = on_a_line([np.zeros(300), np.zeros(300)], local=0.0)
+    pairs = nearest(features, nodes, distance=distance, n_nearest=3)
     np.testing.assert_array_equal(pairs.other[pairs.row == 100], [0, 1, 2])
     np.testing.assert_array_equal(pairs.other[pairs.row == 1], [0, 3, 4])
+    np.testing.assert_array_equal(np.bincount(pairs.row, minlength=600)[1:299], 3)
 
 
 def test_rows_can_be_made_apart(make_catalogue):
