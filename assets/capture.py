@@ -89,8 +89,7 @@ class _Reader:
         counts = {"computed_clips": n_read, "carried_clips": len(clips) - n_read}
         refused = [f"{r['path']}: {r['reason']}" for r in rows if r["state"] == "refused"]
         version = session_version(clips)
-        clip_table = tables.from_rows(CLIP, rows)
-        by_clip = tables.by_clip(clip_table)
+        by_clip = {row["clip_id"]: tables.from_rows(CLIP, [row]) for row in rows if row["source_sha256"]}
         return {
             POSE.name: Part(session, tables.concat(POSE, _filled(poses)), version, _stamps(stamps, poses), counts),
             SKELETON.name: Part(
@@ -98,9 +97,9 @@ class _Reader:
             ),
             CLIP.name: Part(
                 session,
-                clip_table,
+                tables.from_rows(CLIP, rows),
                 version,
-                _stamps(stamps, {k: v for k, v in by_clip.items() if k in stamps}),
+                _stamps(stamps, {key: by_clip[key] for key in stamps}),
                 counts | {"refused_clips": len(refused), "refusals": dg.MetadataValue.md(_listed(refused))},
             ),
         }

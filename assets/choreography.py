@@ -50,7 +50,9 @@ def choreography(
     steps, kept = chosen_steps(path, graph, beat_s, clip_ids, duration_s, settings.dance)
     costs = {
         "transition_cost": path.transition_cost[kept],
-        "warp_cost": path.warp_cost[kept] + path.stride_cost[kept],
+        "warp_cost": path.warp_cost[kept],
+        "stride_cost": path.stride_cost[kept],
+        "beat_cost": path.beat_cost[kept],
         "repetition_cost": path.repetition_cost[kept],
     }
     progress.step()
@@ -75,6 +77,7 @@ def search(graph: MotionGraph, beat_s: Float, settings: PathSettings) -> tuple[P
         transition=usual.transition * settings.transition_weight,
         warp=usual.warp * settings.warp_weight,
         usage=usual.usage * settings.repetition_weight,
+        missed_beat=usual.missed_beat * settings.beat_weight,
         jump_back=usual.jump_back * settings.repetition_weight,
     )
     try:

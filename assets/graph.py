@@ -1,7 +1,7 @@
 """The motion graph: which beat of which clip may follow which."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import dagster as dg
 import numpy as np
@@ -12,11 +12,12 @@ from assets.lineage import Part, Progress, Stored
 from assets.partitions import EVERY
 from assets.sources import Studio
 from kernels import rotation
-from kernels.graph.distance import PairDistance, concatenate
-from kernels.graph.features import BeatFeatures, beat_features
+from kernels.graph.distance import PairDistance
+from kernels.graph.features import BeatFeatures, beat_features, concatenate_beats
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
 from kernels.graph.transitions import Transitions, find_transitions
+from kernels.motion.velocity import accents
 from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float, MotionGraph
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
@@ -39,6 +40,7 @@ class Beats:
     duration_s: float
     time_s: Float
     features: BeatFeatures
+    accent: Float
 
 
 @table_assets(
@@ -46,7 +48,7 @@ class Beats:
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
     code_version="1",
-    settings="motion_graph",
+    settings="motion_graph dance",
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
     checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
 )
@@ -66,18 +68,20 @@ def motion_graph(
     ]
     nodes = beat_nodes([b.time_s for b in beats], [b.duration_s for b in beats])
     found = find_transitions(
-        _together(beats, settings),
+        concatenate_beats([b.features for b in beats] or [_of_no_beat(settings)]),
         nodes,
         distance=pair_distance,
         threshold=settings.threshold or None,
         n_nearest=settings.neighbours,
+        min_margin_s=studio.settings().dance.blend_s / 2,
     )
-    losses = {name: prune(found.graph) for name, prune in PRUNE.items()}
+    graph = replace(found.graph, accent=np.concatenate([*(b.accent for b in beats), np.zeros(0)]))
+    losses = {name: prune(graph) for name, prune in PRUNE.items()}
     kept = losses[settings.prune]
     index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
     ids, labels = [b.clip_id for b in beats], [b.label for b in beats]
-    node = tables.from_motion_graph_node(found.graph, ids, index, labels, kept.is_kept)
-    edge = tables.from_motion_graph_edge(found.graph, ids, found.distance)
+    node = tables.from_motion_graph_node(graph, ids, index, labels, kept.is_kept)
+    edge = tables.from_motion_graph_edge(graph, ids, found.distance)
     yield dg.Output(Part("", node, metadata=_metadata(found, losses, settings.prune)), MOTION_GRAPH_NODE.name)
     yield dg.Output(Part("", edge), MOTION_GRAPH_EDGE.name)
     yield dg.AssetCheckResult(
@@ -98,7 +102,7 @@ def _session(
     progress: Progress,
 ) -> list[Beats]:
     """Take the beats of one session's clips with their features."""
-    labels = dict(zip(*(clip.read(key)[c].to_pylist() for c in ("clip_id", "label")), strict=True))
+    labels = {row["clip_id"]: row["label"] for row in clip.read(key).to_pylist() if row["state"] == "read"}
     beats = tables.by_clip(motion_beat.read(key))
     poses = tables.by_clip(canonical_pose.read(key, clip_ids=beats)) if beats else {}
     found = []
@@ -112,23 +116,21 @@ def _session(
             time_s=time_s,
             metric=settings.metric,  # type: ignore[arg-type]
         )
-        found.append(Beats(clip_id, labels[clip_id], moved.duration_s, time_s, features))
+        accent = accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
+        found.append(Beats(clip_id, labels[clip_id], moved.duration_s, time_s, features, accent))
     progress.step()
     return found
 
 
-def _together(beats: list[Beats], settings: MotionGraphSettings) -> BeatFeatures:
-    """Stack the features of all clips; of no beat when there is no clip."""
-    parts = [b.features for b in beats] or [
-        beat_features(
-            np.tile(rotation.IDENTITY, (1, len(JOINTS), 1)),
-            np.zeros((1, len(JOINTS), 3)),
-            frame_rate_hz=1.0,
-            time_s=np.zeros(0),
-            metric=settings.metric,  # type: ignore[arg-type]
-        )
-    ]
-    return BeatFeatures(concatenate([p.pose for p in parts]), np.concatenate([p.local_distance for p in parts]))
+def _of_no_beat(settings: MotionGraphSettings) -> BeatFeatures:
+    """Features of no beat, where no clip has one."""
+    return beat_features(
+        np.tile(rotation.IDENTITY, (1, len(JOINTS), 1)),
+        np.zeros((1, len(JOINTS), 3)),
+        frame_rate_hz=1.0,
+        time_s=np.zeros(0),
+        metric=settings.metric,  # type: ignore[arg-type]
+    )
 
 
 def _metadata(found: Transitions, losses: dict[str, Pruned], chosen: str) -> dict[str, object]:
@@ -147,5 +149,6 @@ def _metadata(found: Transitions, losses: dict[str, Pruned], chosen: str) -> dic
         "threshold_asked": found.threshold_asked,
         "threshold_used": found.threshold_used,
         "removed_for_missing_frames": found.n_margin_removed,
+        "removed_for_jumps_in_recordings": found.n_jerk_removed,
         "catalogue_loss": dg.MetadataValue.md(f"{picture}\n\n{loss}"),
     }

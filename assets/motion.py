@@ -22,6 +22,7 @@ from assets.partitions import SESSION
 from assets.sources import Studio
 from kernels import rotation
 from kernels.motion.beats import BeatSettings, motion_beats
+from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.retarget import retarget
 from schemas.motion import CANONICAL_POSE, MOTION_BEAT
@@ -80,8 +81,14 @@ def motion_beat(
                 return MOTION_BEAT.empty()
             moved = tables.to_canonical_pose(poses[clip_id])
             heading = rotation.heading_rad(moved.rotation_wxyz[:, 0]) if settings.frame == "body" else None
-            beats = motion_beats(moved.position_xyz_m, moved.frame_rate_hz, heading_rad=heading, settings=how)
-            return tables.from_motion_beat(clip_id, beats, moved.frame_rate_hz)
+            first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
+            beats = motion_beats(
+                moved.position_xyz_m[first : last + 1],
+                moved.frame_rate_hz,
+                heading_rad=heading[first : last + 1] if heading is not None else None,
+                settings=how,
+            )
+            return tables.from_motion_beat(clip_id, beats, moved.frame_rate_hz, first_frame=first)
 
         part = per_clip(
             MOTION_BEAT, key, clip_versions(canonical_pose, key, code), one, earlier=earlier, progress=progress

@@ -190,7 +190,7 @@ def _clips(
             digest = "" if problem else cache.sha256(root, file, now_ns)
             if not problem and taken.setdefault(key, path) != path:
                 problem = f"want its own key, got {key!r}, which {taken[key]} has; rename one of the two files"
-            clips.append(Clip(key, session, path, digest, _facts_of(facts, file), problem))
+            clips.append(Clip(key, session, path, "" if problem else digest, _facts_of(facts, file), problem))
     return clips
 
 

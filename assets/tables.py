@@ -220,14 +220,15 @@ def to_canonical_poses(table: pa.Table) -> Iterator[CanonicalClip]:
 # Beats -------------------------------------------------------------------------------------------------------------
 
 
-def from_motion_beat(clip_id: str, beats: MotionBeats, frame_rate_hz: float) -> pa.Table:
-    """Pack the beats of a clip, B rows; none when it has none."""
+def from_motion_beat(clip_id: str, beats: MotionBeats, frame_rate_hz: float, *, first_frame: int = 0) -> pa.Table:
+    """Pack the beats of a clip, B rows, none when it has none; found in the clip from ``first_frame`` on."""
     b = len(beats.time_s)
+    time_s = beats.time_s + first_frame / frame_rate_hz
     columns = [
         pa.array([clip_id] * b, pa.string()),
         pa.array(np.arange(b), pa.int32()),
-        pa.array(np.round(beats.time_s * frame_rate_hz), pa.int32()),
-        pa.array(beats.time_s),
+        pa.array(np.round(time_s * frame_rate_hz), pa.int32()),
+        pa.array(time_s),
         pa.array(np.full(b, beats.confidence), pa.float32()),
         pa.array(np.full(b, beats.interval_s), pa.float32()),
         pa.array(np.full(b, beats.component_share), pa.float32()),
@@ -299,6 +300,7 @@ def from_motion_graph_node(
         pa.array(graph.time_s),
         pa.array(graph.next_node, pa.int32()),
         pa.array([labels[c] for c in graph.clip_index], pa.string()),
+        pa.array(np.zeros(len(graph.time_s)) if graph.accent is None else graph.accent, pa.float32()),
         pa.array(is_kept),
     ]
     return MOTION_GRAPH_NODE.check(pa.table(columns, schema=MOTION_GRAPH_NODE.arrow))
@@ -336,6 +338,7 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
         source=source[inside],
         target=target[inside],
         weight=to_numbers(edge["edge_cost"]).astype(np.float64)[inside],
+        accent=to_numbers(node["accent_score"]).astype(np.float64),
     )
     return graph, clip_ids
 

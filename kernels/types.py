@@ -157,9 +157,12 @@ class MotionGraph:
     next_node : (N,) int64
         The following beat of the same clip: the unidirectional edge; -1 at a clip's last beat.
     source, target : (E,) int64
-        Transition edges, sorted by source, then weight, then target. Symmetric: a bidirectional edge is two rows.
+        Transition edges, sorted by source, then weight, then target. A bidirectional edge is two rows; where missing
+        frames or a jump in the recording forbid one direction, there is only the other.
     weight : (E,) float64, >= 0
         d(i, j) / (d(i) + d(j)), equation 20 of JP5778523B2.
+    accent : (N,) float64, 0 to 1, or None
+        How plainly the body stops at each node, :func:`kernels.motion.velocity.accents`; None where it is not known.
 
     Raises
     ------
@@ -173,9 +176,14 @@ class MotionGraph:
     source: Int
     target: Int
     weight: Float
+    accent: Float | None = None
 
     def __post_init__(self) -> None:
         n, e = len(self.clip_index), len(self.source)
+        if self.accent is not None and not (
+            self.accent.shape == (n,) and ((self.accent >= 0) & (self.accent <= 1)).all()
+        ):
+            raise ValueError(f"accent: want ({n},) from 0 to 1, got {self.accent.shape}")
         for name, size in (("time_s", n), ("next_node", n), ("target", e), ("weight", e)):
             if getattr(self, name).shape != (size,):
                 raise ValueError(f"{name}: want ({size},), got {getattr(self, name).shape}")

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import dagster as dg
+from dagster_shared.error import SerializableErrorInfo
 
 from assets.partitions import SESSION, SONG, dagster_key
 from pipelines.freshness import Finding, Freshness
@@ -32,6 +33,10 @@ class Batch:
     job: str
     assets: tuple[str, ...]
     keys: tuple[str, ...]
+
+    def singles(self) -> list["Batch"]:
+        """Split into batches of one partition each."""
+        return [Batch(self.job, self.assets, (key,)) for key in self.keys]
 
     def tags(self) -> dict[str, str]:
         """Tags that tell Dagster which partitions: one, or a range run as one."""
@@ -149,15 +154,28 @@ def execute(batch: Batch, definitions: dg.Definitions, instance: dg.DagsterInsta
         raise_on_error=False,
         run_config={"loggers": {"console": {"config": {"log_level": "CRITICAL"}}}},
     )
-    return [] if result.success else [_cause(event) for event in result.all_events if event.is_step_failure]
+    if result.success:
+        return []
+    causes = [_cause(event.step_key or batch.job, error) for event in result.all_events for error in _errors(event)]
+    return list(dict.fromkeys(causes)) or [f"{batch.job}: the run failed and gave no reason; see it in 'odori ui'"]
 
 
-def _cause(event: dg.DagsterEvent) -> str:
-    error = event.step_failure_data.error
-    while error is not None and error.cause is not None:
+def _errors(event: dg.DagsterEvent) -> list[SerializableErrorInfo]:
+    """Find what an event says went wrong: in a step, or while its resources were made."""
+    if event.is_step_failure:
+        found = event.step_failure_data.error
+    elif event.event_type == dg.DagsterEventType.RESOURCE_INIT_FAILURE:
+        found = event.engine_event_data.error
+    else:
+        found = None
+    return [found] if found else []
+
+
+def _cause(where: str, error: SerializableErrorInfo) -> str:
+    while error.cause is not None:
         error = error.cause
-    message = error.message.strip() if error else "no reason was given"
-    return f"{event.step_key}: {message.partition(': ')[2] or message}"
+    message = error.message.strip()
+    return f"{where}: {message.partition(': ')[2] or message}"
 
 
 def bring_up_to_date(
@@ -181,7 +199,13 @@ def bring_up_to_date(
         for batch in batches:
             tried.add(batch)
             report.ran.append(batch)
-            report.failed += execute(batch, definitions, instance)
+            failed = execute(batch, definitions, instance)
+            if failed and len(batch.keys) > 1:  # one partition's trouble must not stop its neighbours: one by one
+                for single in batch.singles():
+                    tried.add(single)
+                    report.failed += execute(single, definitions, instance)
+            else:
+                report.failed += failed
         state.forget()
 
 

@@ -8,7 +8,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sqlalchemy.exc import DBAPIError
+
+from assets.formats.errors import FormatError
 from assets.lineage import Progress
+from assets.motion import beat_settings
 from assets.partitions import METHODS
 from assets.sources import Request, Song
 from pipelines import build as building
@@ -47,6 +51,7 @@ class _Session:
 
     def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
         self.studio = studio
+        check_settings(studio)
         self.state = freshness(studio)
         self._progress = progress
 
@@ -61,9 +66,24 @@ class _Session:
                 return building.bring_up_to_date(
                     self.studio, definitions, instance, self.state, groups=groups, keys=keys
                 )
+        except DBAPIError as error:  # what was stored before is whole: tables are written beside and renamed
+            place = self.studio.dagster_home
+            raise StudioError(
+                f"{place}: Dagster's storage refused: {error.orig}; free some space or mend it"
+            ) from error
         finally:
             if hasattr(bar, "close"):
                 bar.close()
+
+
+def check_settings(studio: StudioFolder) -> None:
+    """Refuse settings before anything runs; FormatError naming the key."""
+    try:
+        beat_settings(studio.settings().motion_beat)
+    except ValueError as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError("odori.toml", 0, f"[motion_beat] {error}") from error
 
 
 def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:

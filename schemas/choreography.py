@@ -27,6 +27,8 @@ CHOREOGRAPHY = Table(
         Column("pin_id", pa.string(), "The pin this step serves; null when none.", is_optional=True),
         Column("transition_cost", pa.float32(), "Cost of the seam before the step, by pose distance."),
         Column("warp_cost", pa.float32(), "Cost of leaving the clip's own pace."),
+        Column("stride_cost", pa.float32(), "Cost of half- or double-time."),
+        Column("beat_cost", pa.float32(), "Cost of music beats on which the body does not visibly stop."),
         Column("repetition_cost", pa.float32(), "Cost of showing again what was shown."),
     ),
 )

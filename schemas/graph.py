@@ -21,6 +21,7 @@ MOTION_GRAPH_NODE = Table(
         f.TIME_S,
         Column("next_node_index", pa.int32(), "The clip's next beat; -1 at its last."),
         Column("label", pa.string(), "Label of the clip."),
+        Column("accent_score", pa.float32(), "How plainly the body stops at this beat, 0 to 1."),
         Column("is_kept", pa.bool_(), "False where pruning found that a dance could not go on from here."),
     ),
 )

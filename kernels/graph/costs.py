@@ -36,6 +36,9 @@ class PathCosts:
         A transition costs ``jump_back`` more when it goes back in its own clip by at most the window, in seconds.
     usage : float, >= 0
         Showing a stretch between two motion beats for the n-th time costs ``usage · (n − 1)``.
+    missed_beat : float, >= 0
+        A step over d music beats that ends on a node of accent a costs ``missed_beat · (d − a)``: each music beat on
+        which the body does not visibly stop. Nothing where the graph's accents are not known.
 
     Raises
     ------
@@ -56,6 +59,7 @@ class PathCosts:
     jump_back: float = 1.0
     jump_back_window_s: float = 8.0
     usage: float = 0.5
+    missed_beat: float = 1.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -96,6 +100,25 @@ def warp_cost(ratio: Float, costs: PathCosts) -> Float:
 def stride_cost(motion_beats: int, music_beats: int, costs: PathCosts) -> float:
     """Price of dancing in half- or double-time: ``stride · |log2(m / d)|``; 0 for beat on beat."""
     return costs.stride * abs(float(np.log2(motion_beats / music_beats)))
+
+
+def beat_cost(graph: MotionGraph, end: Int, music_beats: int, costs: PathCosts) -> Float:
+    """Price of the music beats a step leaves undanced.
+
+    Parameters
+    ----------
+    graph : MotionGraph
+    end : (M,) int64, nodes where steps end; -1 counts nothing
+    music_beats : int, >= 1, beats the steps cover
+    costs : PathCosts
+
+    Returns
+    -------
+    (M,) float64, >= 0: ``missed_beat · (d − accent)``; zeros where the graph's accents are not known
+    """
+    if graph.accent is None:
+        return np.zeros(len(end))
+    return np.where(end >= 0, costs.missed_beat * (music_beats - graph.accent[np.maximum(end, 0)]), 0.0)
 
 
 def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:

@@ -52,7 +52,7 @@ class Path:
     beat_span, motion_span : (S,) int64, >= 1, music and motion beats it covers
     has_transition : (S,) bool
         Whether it does not start where the step before ended.
-    transition_cost, warp_cost, repetition_cost, stride_cost : (S,) float64, >= 0
+    transition_cost, warp_cost, repetition_cost, stride_cost, beat_cost : (S,) float64, >= 0
     warp_ratio : (S,) float64, song time ÷ clip time
     is_outside : (S,) bool, whether the ratio leaves the hard bounds
     """
@@ -67,15 +67,15 @@ class Path:
     warp_cost: Float
     repetition_cost: Float
     stride_cost: Float
+    beat_cost: Float
     warp_ratio: Float
     is_outside: Mask
 
     @property
     def total_cost(self) -> float:
         """Sum of all components over all steps."""
-        return float(
-            self.transition_cost.sum() + self.warp_cost.sum() + self.repetition_cost.sum() + self.stride_cost.sum()
-        )
+        parts = self.transition_cost, self.warp_cost, self.repetition_cost, self.stride_cost, self.beat_cost
+        return float(sum(part.sum() for part in parts))
 
 
 def find_path(
@@ -216,7 +216,8 @@ def _most_expensive(graph: MotionGraph, beat_s: Float, costs: PathCosts, steps: 
     largest = float(graph.weight.max(initial=0.0))
     scale = costs.transition_scale or (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
     seam = costs.seam + costs.transition * largest / scale + costs.jump_back
-    return 1.0 + n_beats * (warp + stride + seam + longest * costs.usage * n_beats * longest)
+    missed = costs.missed_beat * max(d for _, d in steps)
+    return 1.0 + n_beats * (warp + stride + seam + missed + longest * costs.usage * n_beats * longest)
 
 
 def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, graph: MotionGraph) -> Path:
@@ -225,7 +226,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     if program is None or not moves:
         none, no = np.zeros(0, np.int64), np.zeros(0, bool)
         zero = np.zeros(0)
-        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, no)
+        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, no)
     span = np.array([d for _, d in program.steps])[kind]
     end = np.array([program.end[k][u] for _, u, k in moves], np.int64)
     seams = np.append(False, source[1:] != end[:-1])
@@ -247,6 +248,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
         warp_cost=warp_cost(ratio, costs),
         repetition_cost=repetition,
         stride_cost=stride,
+        beat_cost=np.array([program.missed[k][u] for _, u, k in moves]),
         warp_ratio=ratio,
         is_outside=~is_within(ratio, costs.hard_ratio),
     )

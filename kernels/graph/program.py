@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.costs import PathCosts, is_within, jump_back_cost, stride_cost, transition_cost, warp_cost
+from kernels.graph.costs import PathCosts, beat_cost, is_within, jump_back_cost, stride_cost, transition_cost, warp_cost
 from kernels.types import Float, Int, MotionGraph
 
 Mask = NDArray[np.bool_]
@@ -83,9 +83,10 @@ class Program:
                 end = np.where(end >= 0, graph.next_node[end], -1)
             self.end.append(end)
             self.clip_s.append(np.where(end >= 0, graph.time_s[end] - graph.time_s, np.inf))
+        self.missed = [beat_cost(graph, end, d, costs) for end, (_, d) in zip(self.end, steps, strict=True)]
 
     def step_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float | None:
-        """Cost of a kind of step at a beat, one a node: warp and stride; infinite where it cannot be danced.
+        """Cost of a kind of step at a beat, one a node: warp, stride, missed beats; infinite where it cannot be danced.
 
         None where the step would pass the last beat.
         """
@@ -97,7 +98,7 @@ class Program:
         if self._admissible is not None:
             fits &= self._admissible[beat : beat + music_beats, nodes].all(axis=0)
         cost = np.full(ratio.shape, np.inf)
-        cost[fits] = warp_cost(ratio[fits], self.costs) + self.stride[kind]
+        cost[fits] = warp_cost(ratio[fits], self.costs) + self.stride[kind] + self.missed[kind][nodes][fits]
         if self._outside_price:
             cost[fits & ~is_within(ratio, self.costs.hard_ratio)] += self._outside_price
         return cost

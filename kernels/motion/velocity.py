@@ -67,6 +67,36 @@ def kinematic_beats(position_m: Float, frame_rate_hz: float, *, smoothing_s: flo
     return np.flatnonzero((here < before) & (here <= after)) + 1
 
 
+def usable_frames(position_m: Float, frame_rate_hz: float) -> tuple[int, int]:
+    """Leave out frames at a clip's ends that no body moves to: a T-pose before the take, a reset after it (ours).
+
+    Parameters
+    ----------
+    position_m : (F, J, 3) float, metres, world
+    frame_rate_hz : float, > 0
+
+    Returns
+    -------
+    first, last : int, frames
+        What lies between a jump in the first three steps and one in the last three; a jump is a joint faster than
+        8 m/s and than four times the 95th percentile of the clip. 0 and F - 1 where there is none, and when F < 12.
+
+    Raises
+    ------
+    ValueError
+        As :func:`mean_speed`.
+    """
+    check_position(position_m, frame_rate_hz)
+    n = len(position_m)
+    if n < 12:
+        return 0, max(n - 1, 0)
+    fastest = np.linalg.norm(np.diff(position_m, axis=0), axis=-1).max(axis=-1) * frame_rate_hz
+    jump = fastest > max(8.0, 4 * float(np.percentile(fastest, 95)))
+    first = int(np.flatnonzero(jump[:3])[-1]) + 1 if jump[:3].any() else 0
+    last = n - 4 + int(np.flatnonzero(jump[-3:])[0]) if jump[-3:].any() else n - 1
+    return first, last
+
+
 def accents(position_m: Float, frame_rate_hz: float, *, time_s: Float, sigma_s: float = 0.05) -> Float:
     """Tell how plainly the body stops at given moments: 1 where speed is at its minimum, 0 far from any (ours).
 

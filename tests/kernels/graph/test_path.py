@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,8 @@ def brute_force(graph, beat_s, costs=NO_USAGE, steps=STEPS, starts=None, admissi
                     continue
                 outside = not costs.hard_ratio[0] <= ratio <= costs.hard_ratio[1]
                 price = seam + float(warp_cost(ratio, costs)) + stride_cost(m, d, costs)
+                if graph.accent is not None:
+                    price += costs.missed_beat * (d - graph.accent[end])
                 dance(beat + d, [(end, 0.0), *jumps.get(end, [])], n_outside + outside, cost + price)
 
     if starts is None:
@@ -188,6 +192,33 @@ def test_agrees_with_all_paths_under_other_arguments(make_random_graph, seed):
     assert path.total_cost == pytest.approx(expected[1], abs=1e-9)
     for at, span, node in zip(path.beat_index, path.beat_span, path.source_node, strict=True):
         assert arguments["admissible"][at : at + span, node].all()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_agrees_with_all_paths_where_accents_are_known(make_random_graph, seed):
+    rng = np.random.default_rng(3000 + seed)
+    graph = make_random_graph(seed, n_clips=4, n_transitions=8)
+    graph = replace(graph, accent=rng.random(len(graph.clip_index)))
+    beat_s = np.cumsum(rng.uniform(0.4, 0.7, rng.integers(3, 6)))
+    expected = brute_force(graph, beat_s, starts=range(len(graph.clip_index)))
+    if expected is None:
+        with pytest.raises(InfeasiblePathError):
+            find_path(graph, beat_s, costs=NO_USAGE, starts="any")
+        return
+    path = find_path(graph, beat_s, costs=NO_USAGE, starts="any")
+    check_legal(path, graph, beat_s)
+    assert int(path.is_outside.sum()) == expected[0]
+    assert path.total_cost == pytest.approx(expected[1], abs=1e-9)
+    np.testing.assert_allclose(path.beat_cost, path.beat_span - graph.accent[path.end_node])
+
+
+def test_a_clip_that_stops_on_the_beat_is_preferred(make_graph):
+    graph = make_graph([[0.0, 0.5, 1.0, 1.5], [0.0, 0.5, 1.0, 1.5]])
+    plain = find_path(graph, np.array([0.0, 0.5, 1.0]))
+    accented = find_path(replace(graph, accent=np.array([0.0] * 4 + [1.0] * 4)), np.array([0.0, 0.5, 1.0]))
+    assert plain.source_node[0] == 0
+    assert accented.source_node[0] == 4
+    assert accented.beat_cost.sum() == 0
 
 
 @pytest.mark.parametrize("seed", range(20))
