@@ -5,7 +5,7 @@ from dataclasses import replace
 import dagster as dg
 import pyarrow as pa
 
-from assets import tables
+from assets import plots, tables
 from assets.declare import table_asset
 from assets.lineage import Part, Progress
 from assets.partitions import DANCE, lake_key
@@ -65,6 +65,7 @@ def choreography(
             "clips": len(set(steps.clip_id)),
             "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
             "begins_at": begins,
+            "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
         },
     )
 

@@ -139,7 +139,14 @@ def _metadata(found: Transitions, losses: dict[str, Pruned], chosen: str) -> dic
     loss = plots.markdown(
         ("pruning", "beats lost", "clips lost", "seconds lost", "of", "used"),
         [
-            (name, p.n_nodes_lost, p.n_clips_lost, p.lost_s, p.total_s, "yes" if name == chosen else "")
+            (
+                name,
+                p.n_nodes_lost,
+                p.n_clips_lost,
+                f"{p.lost_s:.1f}",
+                f"{p.total_s:.1f}",
+                "yes" if name == chosen else "",
+            )
             for name, p in losses.items()
             if name != "none"
         ],

@@ -134,8 +134,8 @@ def motion_graph(weight: Float, threshold: float, degree: Float) -> str:
     left.axvline(threshold, color=_WARM, linewidth=1)
     left.set_xlabel("d(i,j) / (d(i) + d(j)), threshold red", fontsize=8)
     left.set_ylabel("transitions", fontsize=8)
-    right.hist(degree, bins=np.arange(degree.max(initial=0) + 2) - 0.5, color=_COOL)
-    right.set_xlabel("transitions from a beat", fontsize=8)
+    right.hist(np.minimum(degree, 60), bins=np.arange(62) - 0.5, color=_COOL)
+    right.set_xlabel("transitions from a beat, 60 and more together", fontsize=8)
     right.set_ylabel("beats", fontsize=8)
     for axes in (left, right):
         _plain(axes)
@@ -157,20 +157,18 @@ def dance_timeline(dance: Dance, steps: Choreography, music_beat_s: Float) -> by
     seam_s = steps.song_start_s[steps.has_seam]
     band.vlines(seam_s, -0.5, 0.5, color=_INK, linewidth=1.2)
     band.vlines(music_beat_s, 0.5, 0.7, color=_COOL, linewidth=0.7)
-    phrase = np.append(0, np.flatnonzero(steps.has_seam))
-    for a in dict.fromkeys(phrase.tolist()):
-        band.text(
-            steps.song_start_s[a],
-            0,
-            " " + steps.clip_id[a].rsplit("-", 1)[-1],
-            fontsize=6,
-            rotation=90,
-            va="center",
-            clip_on=True,
-        )
+    for number, (a, b) in enumerate(phrases(steps), start=1):
+        if steps.song_end_s[b - 1] - steps.song_start_s[a] > 0.012 * float(dance.time_s[-1]):
+            band.text(
+                (steps.song_start_s[a] + steps.song_end_s[b - 1]) / 2, 0, number, fontsize=7, ha="center", va="center"
+            )
     band.set_yticks([])
     band.set_ylim(-0.5, 0.75)
-    band.set_title("steps by clip, seams black, music beats blue", fontsize=8, loc="left")
+    band.set_title(
+        "phrases by clip, numbered as in the choreography's table; seams black, music beats blue",
+        fontsize=8,
+        loc="left",
+    )
     warp.axhspan(0.90, 1.10, color="#e6f0e6")
     warp.step(
         np.append(steps.song_start_s, steps.song_end_s[-1:]),
@@ -191,6 +189,29 @@ def dance_timeline(dance: Dance, steps: Choreography, music_beat_s: Float) -> by
     for axes in (band, warp, speed):
         _plain(axes)
     return png(figure)
+
+
+def phrases(steps: Choreography) -> list[tuple[int, int]]:
+    """Runs of steps without a seam between them: first step, and one past the last."""
+    start = np.append(0, np.flatnonzero(steps.has_seam))
+    return [(a, b) for a, b in zip(start.tolist(), [*start[1:].tolist(), len(steps.clip_id)], strict=True) if b > a]
+
+
+def phrase_table(steps: Choreography) -> str:
+    """List what is danced when, one row a phrase."""
+    rows = [
+        (
+            number,
+            f"{steps.song_start_s[a]:.2f} to {steps.song_end_s[b - 1]:.2f}",
+            steps.clip_id[a],
+            f"{steps.clip_start_s[a]:.2f} to {steps.clip_end_s[b - 1]:.2f}",
+            b - a,
+            f"{steps.warp_ratio[a:b].min():.2f} to {steps.warp_ratio[a:b].max():.2f}",
+            f"{steps.blend_s[a]:.2f}",
+        )
+        for number, (a, b) in enumerate(phrases(steps), start=1)
+    ]
+    return markdown(("phrase", "song, s", "clip", "clip, s", "steps", "warp", "blend, s"), rows, longest=200)
 
 
 def contact_sheet(dance: Dance, parent: Sequence[int], *, n_figures: int = 16) -> bytes:

@@ -249,6 +249,8 @@ def clear_after_kill(studio: StudioFolder, instance: dg.DagsterInstance) -> int:
 _CONFIGURATION = """\
 telemetry:
   enabled: false
+nux:
+  enabled: false
 compute_logs:
   module: dagster._core.storage.noop_compute_log_manager
   class: NoOpComputeLogManager

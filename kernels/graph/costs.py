@@ -59,7 +59,7 @@ class PathCosts:
     jump_back: float = 1.0
     jump_back_window_s: float = 8.0
     usage: float = 0.5
-    missed_beat: float = 1.0
+    missed_beat: float = 2.0
 
     def __post_init__(self) -> None:
         for field in fields(self):

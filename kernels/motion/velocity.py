@@ -97,11 +97,13 @@ def usable_frames(position_m: Float, frame_rate_hz: float) -> tuple[int, int]:
     return first, last
 
 
-def accents(position_m: Float, frame_rate_hz: float, *, time_s: Float, sigma_s: float = 0.05) -> Float:
-    """Tell how plainly the body stops at given moments: 1 where speed is at its minimum, 0 far from any (ours).
+def accents(
+    position_m: Float, frame_rate_hz: float, *, time_s: Float, sigma_s: float = 0.05, half_drop_m_per_s: float = 0.05
+) -> Float:
+    """Tell how plainly the body stops at given moments: towards 1 on a marked stop, 0 far from any (ours).
 
     A motion beat of the largest component is not always a moment a viewer sees as one; a choice of beats weighed by
-    this is.
+    this is. A stop counts by how much speed is lost on it, so that a dance is not sought among people who hardly move.
 
     Parameters
     ----------
@@ -109,23 +111,31 @@ def accents(position_m: Float, frame_rate_hz: float, *, time_s: Float, sigma_s: 
     frame_rate_hz : float, > 0
     time_s : (B,) float, seconds from the first frame
     sigma_s : float, seconds, > 0
-        A minimum this far away counts exp(-1/2).
+        A stop this far away counts exp(-1/2).
+    half_drop_m_per_s : float, metres per second, >= 0
+        Drop in mean joint speed, from the peaks on either side, that counts one half.
 
     Returns
     -------
     (B,) float64, 0 to 1
-        ``exp(-d^2 / 2 sigma^2)``, d to the nearest of :func:`kinematic_beats`; zeros when there are none.
+        ``exp(-d^2 / 2 sigma^2) * drop / (drop + half)`` of the nearest of :func:`kinematic_beats`, d away; zeros when
+        there are none.
 
     Raises
     ------
     ValueError
         As :func:`mean_speed`.
     """
-    stop_s = kinematic_beats(position_m, frame_rate_hz) / frame_rate_hz
-    if len(stop_s) == 0 or len(time_s) == 0:
+    speed = mean_speed(position_m, frame_rate_hz)
+    stop = kinematic_beats(position_m, frame_rate_hz)
+    if len(stop) == 0 or len(time_s) == 0:
         return np.zeros(len(time_s))
-    distance_s = np.abs(time_s[:, None] - stop_s).min(axis=1)
-    return np.asarray(np.exp(-(distance_s**2) / (2 * sigma_s**2)), np.float64)
+    peak = np.maximum.reduceat(speed, np.append(0, stop))
+    drop = (peak[:-1] + peak[1:]) / 2 - speed[stop]
+    apart_s = np.abs(np.asarray(time_s)[:, None] - stop / frame_rate_hz)
+    nearest = apart_s.argmin(axis=1)
+    marked = drop / np.maximum(drop + half_drop_m_per_s, 1e-12)
+    return np.asarray(np.exp(-(apart_s.min(axis=1) ** 2) / (2 * sigma_s**2)) * marked[nearest], np.float64)
 
 
 def jerk(position_m: Float, frame_rate_hz: float) -> Float:

@@ -44,6 +44,8 @@ CHORD_STEPS = {
     "arpeggio8": ("x.x.",),
     "arpeggio16": ("xxxx",),
 }
+INVENTION = ((0.95, 0.65, 0.3, 0.25, 0.1), (0.04, 0.15, 0.8, 0.12, 0.08))
+"""Chance of a kick and of a snare on the one, on other odd beats, on even beats, half-way between, and elsewhere."""
 BASS_PROGRAMS = (32, 33, 34, 36, 38)
 CHORD_PROGRAMS = (0, 4, 16, 24, 25, 27, 29, 30, 30, 48, 50, 81, 88)
 MELODY_PROGRAMS = (40, 52, 54, 56, 65, 73, 80, 81, 0, 11, 26)
@@ -165,6 +167,8 @@ class _Band:
             self.parts.add("drums")
         else:
             self.parts.add("chords")
+        self.chords_per_bar = float(rng.choice([1.0, 0.5, 2.0], p=[0.65, 0.2, 0.15]))
+        self.is_inventive = bool(rng.random() < 0.2)
         self.rows: list[Row] = []
 
     def play(self) -> list[Row]:
@@ -195,10 +199,10 @@ class _Band:
 
         chords = pick(g.chords)
         bass = pick(g.bass)
-        kick = self._vary(pick(g.kick))
+        kick = self._vary(self._invent(0) if self.is_inventive else pick(g.kick))
         theme = {
             "kick": kick,
-            "snare": self._vary(pick(g.snare)),
+            "snare": self._vary(self._invent(1) if self.is_inventive else pick(g.snare)),
             "time": pick(g.time),
             "snare_key": str(g.snare_keys[int(rng.integers(len(g.snare_keys)))]),
             "time_key": str(g.time_keys[int(rng.integers(len(g.time_keys)))]),
@@ -215,6 +219,22 @@ class _Band:
             if rng.random() < 0.5:
                 theme[f"extra{i}"] = f"{key} {steps}"
         return theme
+
+    def _invent(self, instrument: int) -> str:
+        """Draw a bar of kick (0) or snare (1) step by step, strong places more often than weak ones."""
+        per_beat, n_beats = self.groove.steps_per_beat, self.groove.beats_per_bar
+        on_one, on_odd, on_even, on_half, elsewhere = INVENTION[instrument]
+        steps = ""
+        for step in range(self.n_steps):
+            beat, place = divmod(step, per_beat)
+            if place:
+                chance = on_half if 2 * place == per_beat or per_beat == 3 else elsewhere
+            elif n_beats == 3:
+                chance = on_one if beat == 0 else on_even
+            else:
+                chance = on_one if beat == 0 else on_odd if beat % 2 == 0 else on_even
+            steps += "x" if self.rng.random() < chance else "."
+        return steps
 
     def _singing(self, step: int) -> float:
         """Chance of a melody note on a step."""
@@ -240,7 +260,7 @@ class _Band:
         return varied
 
     def _progression(self) -> list[int]:
-        """Choose scale degrees, 0 to 6, one a bar, starting on the tonic more often than not."""
+        """Choose scale degrees, 0 to 6, one a chord, starting on the tonic more often than not."""
         rng = self.rng
         length = int(rng.choice([2, 4, 4, 8]))
         degrees = [
@@ -287,14 +307,12 @@ class _Band:
         is_first: bool,
         is_last: bool,
     ) -> None:
-        degree = progression[bar % len(progression)]
-        root = 36 + (self.key + self.scale[degree]) % 12
         if "drums" in playing:
             self._drums(bar, theme, is_first=is_first, is_last=is_last)
         if "bass" in playing:
-            self._bass(bar, theme, root, degree)
+            self._bass(bar, theme, progression)
         if "chords" in playing:
-            self._chords(bar, theme, degree)
+            self._chords(bar, theme, progression)
         if "melody" in playing and self.rng.random() < 0.85:
             self._melody(bar, theme)
 
@@ -322,10 +340,16 @@ class _Band:
         if is_first and rng.random() < 0.5:
             self._add("drums", bar, 0, 0.5, CRASH, 110)
 
-    def _bass(self, bar: int, theme: dict[str, str], root: int, degree: int) -> None:
+    def _degree(self, progression: list[int], bar: int, step: int) -> int:
+        """Chord of a step as a scale degree: chords last one bar, two, or half a bar."""
+        return progression[int((bar + max(step, 0) / self.n_steps) * self.chords_per_bar + 1e-9) % len(progression)]
+
+    def _bass(self, bar: int, theme: dict[str, str], progression: list[int]) -> None:
         hits = self._hits(theme["bass_steps"])
         for i, (step, velocity) in enumerate(hits):
             after = hits[i + 1][0] if i + 1 < len(hits) else self.n_steps
+            degree = self._degree(progression, bar, step)
+            root = 36 + (self.key + self.scale[degree]) % 12
             key = root
             if theme["bass"] == "walking":
                 key = root if step == 0 else 36 + (self.key + self.scale[(degree + int(self.rng.integers(7))) % 7]) % 12
@@ -337,14 +361,15 @@ class _Band:
                 key = root + int(self.rng.choice([7, 12, -5]))
             self._add("bass", bar, step, 0.9 * (after - step), key, velocity, int(theme["bass_program"]))
 
-    def _chords(self, bar: int, theme: dict[str, str], degree: int) -> None:
+    def _chords(self, bar: int, theme: dict[str, str], progression: list[int]) -> None:
         hits = self._hits(theme["chord_steps"])
-        tones = [48 + self.key + self.scale[(degree + i) % 7] + 12 * ((degree + i) // 7) for i in (0, 2, 4)]
         spread = theme["chords"].startswith("arpeggio")
         if not spread and hits and bar and self.rng.random() < 0.08:
             hits[0] = (-self.groove.steps_per_beat // 2, hits[0][1])  # the push: an eighth early
         for i, (step, velocity) in enumerate(hits):
             after = hits[i + 1][0] if i + 1 < len(hits) else self.n_steps
+            degree = self._degree(progression, bar, step)
+            tones = [48 + self.key + self.scale[(degree + j) % 7] + 12 * ((degree + j) // 7) for j in (0, 2, 4)]
             keys = [tones[i % 3] + 12 * (i // 3 % 2)] if spread else tones
             for key in keys:
                 self._add("chords", bar, step, 0.85 * (after - step), key, velocity - 14, int(theme["chord_program"]))

@@ -80,6 +80,13 @@ GROOVES = (
         weight=3.0,
     ),
     Groove(
+        "double time", 88, 138, 4, 4,
+        ("x...x...x...x...", "x..xx..xx..xx..x", "x...x..xx...x..x", "x.x.x.x.x.x.x.x.", "xx..x..x.x..xx.x"),
+        ("..X...X...X...X.", "..X...X...X...Xo"), (EIGHTHS, SIXTEENTHS, "x...x.x."),
+        time_keys=(HAT, RIDE, OPEN_HAT, CRASH),
+        bass=("kick", "eighths", "octaves"), chords=("eighths", "held", "offbeat", "sixteenths"), weight=2.0,
+    ),
+    Groove(
         "metal", 100, 200, 4, 4,
         ("x.x.x.x.x.x.x.x.", "xxxxxxxxxxxxxxxx", "x..xx..xx..xx..x", "x.xxx.xxx.xxx.xx", "x.......x.......",
         "xxx.xxx.xxx.xxx."),

@@ -50,6 +50,14 @@ def test_accents_are_full_on_a_stop_and_nothing_between(swing):
     assert sigma == pytest.approx(np.exp(-0.5), abs=0.1)
 
 
+def test_a_slight_stop_counts_less(swing):
+    plain = accents(swing, 60.0, time_s=np.array([1.25]))[0]
+    slight = accents(0.01 * swing, 60.0, time_s=np.array([1.25]))[0]
+    assert plain > 0.95
+    assert slight == pytest.approx(0.5, abs=0.15)
+    assert accents(0.01 * swing, 60.0, time_s=np.array([1.25]), half_drop_m_per_s=0.0)[0] > 0.95
+
+
 def test_accents_without_stops_are_zero():
     np.testing.assert_array_equal(accents(np.zeros((50, 1, 3)), 30.0, time_s=np.array([0.5, 1.0])), [0, 0])
     assert accents(np.zeros((50, 1, 3)), 30.0, time_s=np.zeros(0)).shape == (0,)
