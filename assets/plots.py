@@ -192,7 +192,7 @@ def dance_timeline(dance: Dance, steps: Choreography, music_beat_s: Float) -> by
 
 
 def phrases(steps: Choreography) -> list[tuple[int, int]]:
-    """Runs of steps without a seam between them: first step, and one past the last."""
+    """Find the runs of steps without a seam between them: first step, and one past the last."""
     start = np.append(0, np.flatnonzero(steps.has_seam))
     return [(a, b) for a, b in zip(start.tolist(), [*start[1:].tolist(), len(steps.clip_id)], strict=True) if b > a]
 

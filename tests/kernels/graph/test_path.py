@@ -209,7 +209,8 @@ def test_agrees_with_all_paths_where_accents_are_known(make_random_graph, seed):
     check_legal(path, graph, beat_s)
     assert int(path.is_outside.sum()) == expected[0]
     assert path.total_cost == pytest.approx(expected[1], abs=1e-9)
-    np.testing.assert_allclose(path.beat_cost, path.beat_span - graph.accent[path.end_node])
+    expected_cost = NO_USAGE.missed_beat * (path.beat_span - graph.accent[path.end_node])
+    np.testing.assert_allclose(path.beat_cost, expected_cost)
 
 
 def test_a_clip_that_stops_on_the_beat_is_preferred(make_graph):
