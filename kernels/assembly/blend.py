@@ -100,6 +100,13 @@ def turn(root_xyz_m: Float, rotation_wxyz: Float, angle_rad: float) -> tuple[Flo
     return rotation.apply(q, root_xyz_m), turned
 
 
+def _lowest_m(skeleton: Skeleton, root_xyz_m: Float, rotation_wxyz: Float) -> Float:
+    """Height of the lowest joint of each frame, (F,): of the feet, whatever else lies on the floor."""
+    position, _ = kinematics.forward(skeleton, root_xyz_m, rotation_wxyz)
+    feet = [k for k, name in enumerate(skeleton.joints) if name.endswith(("Foot", "Toes"))]
+    return np.asarray(position[:, feet or slice(None), 1].min(axis=1), np.float64)
+
+
 def assemble(
     steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton, frame_rate_hz: float, duration_s: float
 ) -> Dance:
@@ -110,7 +117,8 @@ def assemble(
     one before stood and faces where it faced; over the blend both are played at the same pace and mixed by slerp,
     half and half on the seam. The dance starts at the origin, facing +Z.
 
-    After JP5778523B2, equations 21, 22 and 27; centred blends, blended root travel and the smooth clock are ours.
+    After JP5778523B2, equations 21, 22 and 27; centred blends, blended root travel, feet kept at their height through a
+    blend and the smooth clock are ours.
 
     Parameters
     ----------
@@ -172,8 +180,13 @@ def assemble(
         root[alone], rot[alone], clip_time[alone] = xyz[~mixed], q[~mixed], clip_s[~mixed]
         if len(both):
             share = ease((time_s[both] - seam_s + before) / (2 * before))
+            low_m = (1 - share) * _lowest_m(skeleton, root[both], rot[both]) + share * _lowest_m(
+                skeleton, xyz[mixed], q[mixed]
+            )
             root[both] += share[:, None] * (xyz[mixed] - root[both])
             rot[both] = rotation.slerp(rot[both], q[mixed], share[:, None])
+            # Knees bent halfway do not carry hips at half the height: the lower foot decides instead.
+            root[both, 1] += low_m - _lowest_m(skeleton, root[both], rot[both])
             leads = time_s[both] + 1e-9 >= seam_s
             partner[both] = np.where(leads, a - 1, a)
             partner_time[both] = np.where(leads, clip_time[both], clip_s[mixed])
