@@ -48,7 +48,7 @@ MUSIC_TEMPO = Table(
     key=("song_id", "level_ratio"),
     columns=(
         f.SONG_ID,
-        Column("level_ratio", pa.float32(), "Tempo of the candidate over the tempo chosen: 0.5, 1, 2 …"),
+        Column("level_ratio", pa.float32(), "Tempo of the candidate over the tempo chosen: 0.5, 1, 2 and so on."),
         Column("tempo_bpm", pa.float32(), "Median tempo of the candidate."),
         Column("tempo_score", pa.float32(), "Score, comparable within a song; higher is better."),
         Column("is_chosen", pa.bool_(), "Whether the beat table follows this level."),

@@ -1,0 +1,68 @@
+"""What a studio says of its clips, in our columns and in those of data sets."""
+
+import pytest
+
+from assets.formats.clips_csv import Facts, is_clips_csv, look_up, parse
+from assets.formats.errors import FormatError
+
+
+def test_our_columns():
+    facts = parse(b"file,label,style,subject,licence\nspin.bvh,spin,calm,ayame,CC0-1.0\n")
+    assert facts == {"spin.bvh": Facts("spin", "calm", "ayame", "CC0-1.0")}
+
+
+def test_columns_of_a_labelled_data_set():
+    facts = parse(
+        b"path,dataset,content,style,suggested_class,frames,fps\nset/walk_1.bvh,d,walk,angry,Locomotion,90,30\n"
+    )
+    assert facts == {"set/walk_1.bvh": Facts("walk", "angry", "", "")}
+    assert parse(b"path,class,kind,person\na/b.bvh,Idle,acted,007\n") == {"a/b.bvh": Facts("Idle", "acted", "007", "")}
+
+
+def test_byte_order_mark_spaces_quotes_and_backslashes():
+    facts = parse('\ufeffFile, Label\r\n"a, b\\c.bvh", "two ""words"""\r\n\r\n'.encode())
+    assert facts == {"a, b/c.bvh": Facts('two "words"')}
+
+
+def test_header_alone_says_nothing():
+    assert parse(b"file,label\n") == {}
+
+
+@pytest.mark.parametrize(
+    ("data", "word"),
+    [
+        (b"", "want a column 'file', got nothing"),
+        (b"name;label\na;b\n", "want a column 'file'"),
+        (b"file,label\n\xff,b\n", "want UTF-8, got byte 0xff"),
+        (b"file,label\na,b\na,c\n", "want each file once, got 'a'"),
+    ],
+)
+def test_refusals(data, word):
+    with pytest.raises(FormatError, match=word):
+        parse(data)
+
+
+def test_same_row_twice_is_no_quarrel():
+    assert len(parse(b"file,label\na,b\na,b\n")) == 1
+
+
+def test_longest_ending_counts():
+    facts = {"spin.bvh": Facts("any"), "day/spin.bvh": Facts("day"), "elsewhere/kick.bvh": Facts("kick")}
+    assert look_up(facts, ["studio", "day"], "spin.bvh") == Facts("day")
+    assert look_up(facts, ["studio", "night"], "spin.bvh") == Facts("any")
+    assert look_up(facts, ["studio"], "kick.bvh") == Facts("kick")
+    assert look_up(facts, [], "lost.bvh") is None
+
+
+def test_a_name_that_is_in_two_folders_elsewhere_is_not_guessed():
+    assert look_up({"a/x.bvh": Facts("1"), "b/x.bvh": Facts("2")}, ["c"], "x.bvh") is None
+
+
+def test_which_files_are_read():
+    assert [
+        n for n in ("clips.csv", "Labels.CSV", "labels_extra.csv", "index.csv", "clips.txt") if is_clips_csv(n)
+    ] == [
+        "clips.csv",
+        "Labels.CSV",
+        "labels_extra.csv",
+    ]

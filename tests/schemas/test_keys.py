@@ -1,0 +1,84 @@
+"""Keys: legal for every name there is, stable, and telling names apart."""
+
+import numpy as np
+import pytest
+
+from schemas.keys import (
+    LONGEST_KEY,
+    check_key,
+    clip_key,
+    is_key,
+    part_key,
+    part_of,
+    parts_in_use,
+    session_key,
+    slug,
+    song_key,
+)
+
+NAMES = [
+    "A b",
+    "踊り",
+    "踊り 01",
+    "Été",
+    "__",
+    "",
+    "..",
+    "a" * 300,
+    "x-y_z",
+    "tab\t",
+    'q"q',
+    "🕺",
+    "\udcff",
+    "CON",
+    "a.b.c",
+]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_name_has_a_legal_key(name):
+    assert is_key(slug(name))
+    assert is_key(song_key(name))
+    assert is_key(clip_key([name, name], name))
+    assert is_key(session_key([name]))
+
+
+def test_known_keys():
+    assert clip_key(["bvh_dance", "cmu_salsa"], "60_01") == "bvh_dance-cmu_salsa-60_01"
+    assert slug("Dataset-1 Bow (active)") == "dataset_1_bow_active"
+    assert slug("Été") == "ete"
+    assert session_key([]) == "clips"
+
+
+def test_names_that_lose_letters_stay_apart():
+    assert slug("踊り") != slug("歌")
+    assert slug("踊り 01").startswith("01_")
+    assert slug("a" * 300) != slug("a" * 301)
+
+
+def test_keys_of_many_random_names_are_legal_and_repeat():
+    rng = np.random.default_rng(0)
+    for _ in range(2000):
+        name = "".join(chr(c) for c in rng.integers(32, 0x3100, rng.integers(0, 120)))
+        key = clip_key([name[:40]], name)
+        assert is_key(key)
+        assert len(key) <= LONGEST_KEY
+        assert key == clip_key([name[:40]], name)
+
+
+@pytest.mark.parametrize("text", ["", "A", "a__b", "_a", "a-", "a/b", "a|b", "a\n", "ü", "a" * 81])
+def test_illegal_keys_are_refused(text):
+    assert not is_key(text)
+    with pytest.raises(ValueError, match="key: want"):
+        check_key(text)
+
+
+def test_parts_stay_put_and_are_read_back():
+    names = [f"clip_{i}" for i in range(1000)]
+    before = {name: part_of(name, 8) for name in names}
+    assert {name: part_of(name, 8) for name in names[::3]} == {name: before[name] for name in names[::3]}
+    assert set(before.values()) == set(range(8))
+    keys = [part_key("big", i, 16) for i in range(16)]
+    assert keys[3] == "big-part_03_of_16"
+    assert all(is_key(k) for k in keys)
+    assert parts_in_use([*keys, "small"]) == {"big": 16}
