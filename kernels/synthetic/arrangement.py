@@ -39,6 +39,8 @@ CHORD_STEPS = {
     "backbeat": ("....x...x...x...", "....x.......x..."),
     "syncopated": ("x..x..x.", "x.....x...x.....", "x..x......x.....", "..x..x..x.x..x.."),
     "syncopated16": ("x..x.xx..x.x..x.", "..x..xx..x..xx.x"),
+    "tresillo": ("x..x..x.", "x..x..x.x..x..x.", "x..x..x.x...x..."),
+    "strum": ("x...x.x...x.x.x.", "x.x.x.xxx.x.x.xx", "x..xx.xxx..xx.xx", "x.xxx.xx"),
     "triplets": ("xxx", "Xox"),
     "shuffle": ("x.x",),
     "arpeggio8": ("x.x.",),

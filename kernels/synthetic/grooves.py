@@ -55,7 +55,7 @@ class Groove:
     time_keys: tuple[int, ...] = (HAT, HAT, RIDE)
     extra: tuple[tuple[int, str], ...] = ()
     bass: tuple[str, ...] = ("kick", "eighths", "roots")
-    chords: tuple[str, ...] = ("held", "quarters", "eighths", "syncopated")
+    chords: tuple[str, ...] = ("held", "quarters", "eighths", "syncopated", "strum", "tresillo")
     weight: float = 1.0
 
 
@@ -133,7 +133,7 @@ GROOVES = (
         "ballad", 58, 92, 4, 4,
         ("x.......x.......", "x.........x.....", "x......xx.......", "x.....x.x......."), (BACKBEAT,),
         (EIGHTHS, SIXTEENTHS, QUARTERS), snare_keys=(SNARE, STICK), bass=("roots", "kick"),
-        chords=("held", "arpeggio8", "arpeggio16", "quarters"), weight=2.5,
+        chords=("held", "arpeggio8", "arpeggio16", "quarters", "strum"), weight=2.5,
     ),
     Groove(
         "reggae", 66, 92, 4, 4,
@@ -145,6 +145,13 @@ GROOVES = (
         "reggaeton", 86, 108, 4, 4,
         ("X...X...X...X...",), ("...X..X....X..X.",), (EIGHTHS, SIXTEENTHS), bass=("kick", "syncopated"),
         chords=("held", "offbeat", "syncopated"),
+    ),
+    Groove(
+        "three three two", 92, 156, 4, 4,
+        ("x..x..x.x..x..x.", "X...X...X...X...", "x..x..x.........", "x.........x....."),
+        ("x..x..x.x..x..x.", "....X.......X...", "........X.......", "......x.......x."),
+        ("x..x..x.", EIGHTHS, QUARTERS, SIXTEENTHS), bass=("syncopated", "kick", "eighths"),
+        chords=("tresillo", "syncopated", "tresillo", "held"), weight=1.5,
     ),
     Groove(
         "samba and baiao", 88, 130, 4, 4,
