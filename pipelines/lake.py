@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import IO, Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from upath import UPath
 
@@ -70,7 +71,7 @@ class Lake:
             If it is not stored, or is no table of this kind.
         """
         path = self.path(asset, key)
-        filters = None if clip_ids is None else [("clip_id", "in", sorted(clip_ids))]
+        filters = None if clip_ids is None else pc.field("clip_id").isin(pa.array(sorted(clip_ids), pa.string()))
         try:
             with path.open("rb") as file:
                 table = pq.read_table(file, filters=filters)

@@ -18,6 +18,13 @@ def test_rough_beats_come_to_within_two_milliseconds(click, bpm, end_bpm, rate):
     assert np.abs(found - true).max() < 0.002
 
 
+def test_beats_on_the_ends_of_beeps_go_back_to_their_starts():
+    true = beat_times(tempo_bpm=113, n_beats=30, start_s=0.4)
+    train = click_train(true, click="beep")
+    rough = true + 0.05 + np.random.default_rng(0).normal(0, 0.004, len(true))
+    assert np.abs(snap_to_attacks(rough, train.samples, train.sample_rate_hz) - true).max() < 0.002
+
+
 def test_a_break_is_bridged_in_tempo():
     true = beat_times(tempo_bpm=120, n_beats=40, start_s=0.3)
     dropped = (np.arange(40) > 15) & (np.arange(40) < 22)
@@ -43,7 +50,7 @@ def test_silence_and_few_beats_stay():
 
 def test_strength_peaks_at_the_attack_and_is_even_at_the_edges():
     train = click_train(np.array([0.5]), sample_rate_hz=22050)
-    strength = attack_strength(train.samples, 22050, np.array([0.5, 0.0, 10.0]))
+    strength = attack_strength(train.samples, 22050, np.array([0.5, 0.0, 10.0]), reach_s=0.04)
     assert strength.shape == (3, 41)
     assert abs(int(strength[0].argmax()) - 20) <= 3
     assert strength[2].max() == 0

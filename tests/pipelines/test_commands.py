@@ -1,0 +1,178 @@
+"""What a person types and sees, and what a machine reads."""
+
+import hashlib
+import itertools
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from assets.formats import usd_read
+from assets.tables import to_array
+from pipelines import commands
+from pipelines.resources import NoProgress
+from schemas.catalog import TABLES
+
+
+def odori(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, "-m", "pipelines.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        **options,
+    )
+
+
+def dance(root, *songs, fps=None, out=None):
+    return commands.dance(root, songs or ["beat"], method="graph", frame_rate_hz=fps, out=out, progress=NoProgress)
+
+
+def test_dance_of_the_small_studio(built):
+    folder = built / "dances" / "beat"
+    assert {p.name for p in folder.iterdir()} == {"graph.json", "graph.usdc", "graph.usdz", "song.wav"}
+    report = json.loads((folder / "graph.json").read_text())
+    quality = report["quality"]
+    assert quality["beat_lag_ms"] <= 500 / 30
+    assert quality["beat_f_ratio"] > 0.8
+    assert quality["beat_p_probability"] < 0.01
+    assert quality["warp_easy_ratio"] >= 0.95
+    assert quality["penetration_cm"] <= 1.0
+    assert {c["licence"] for c in report["provenance"]["clips"]} == {"CC0-1.0"}
+    digest = hashlib.sha256((built / "songs" / "beat.wav").read_bytes()).hexdigest()
+    assert report["provenance"]["song"] == {"path": "songs/beat.wav", "sha256": digest}
+
+
+def test_stage_holds_the_dance_of_the_lake(built):
+    clip = usd_read.read_animation(built / "dances" / "beat" / "graph.usdz")
+    pose = pq.read_table(built / "lake" / "dance_pose" / "beat|graph.parquet")
+    assert clip.n_frames == pose.num_rows
+    np.testing.assert_allclose(clip.root_xyz_m, to_array(pose["root_xyz_m"]), atol=1e-6)
+    same = np.abs(np.sum(clip.rotation_wxyz * to_array(pose["rotation_wxyz"]), axis=-1))
+    np.testing.assert_allclose(same, 1.0, atol=1e-6)
+
+
+def test_whole_song_is_danced_and_every_frame_accounted_for(built):
+    song = pq.read_table(built / "lake" / "song" / "beat.parquet").to_pylist()[0]
+    line = pq.read_table(built / "lake" / "frame_lineage" / "beat|graph.parquet")
+    assert line.num_rows == int(song["duration_s"] * 30 + 1e-6) + 1
+    steps = pq.read_table(built / "lake" / "choreography" / "beat|graph.parquet").to_pylist()
+    assert steps[0]["song_start_s"] == 0
+    assert steps[-1]["song_end_s"] == pytest.approx(song["duration_s"])
+    for before, after in itertools.pairwise(steps):
+        continues = before["clip_id"] == after["clip_id"] and before["clip_end_s"] == pytest.approx(
+            after["clip_start_s"]
+        )
+        assert after["has_seam"] == (not continues)
+    assert set(line["clip_id"].to_pylist()) <= {s["clip_id"] for s in steps}
+
+
+def test_every_declared_table_is_stored(built):
+    assert {p.name for p in (built / "lake").iterdir() if p.is_dir()} - {"request"} == set(TABLES)
+
+
+def test_dancing_again_changes_no_byte(studio):
+    before = {p.name: p.read_bytes() for p in (studio / "dances" / "beat").iterdir()}
+    for name in ("choreography", "dance_pose", "frame_lineage", "dance_quality", "usd_animation"):
+        (studio / "lake" / name / "beat|graph.parquet").unlink()
+    assert dance(studio).status == 0
+    assert {p.name: p.read_bytes() for p in (studio / "dances" / "beat").iterdir()} == before
+
+
+def test_frame_rate_and_copy(studio, tmp_path):
+    out = tmp_path / "elsewhere" / "waltz.usdz"
+    outcome = dance(studio, "beat.wav", fps=60.0, out=out)
+    assert outcome.status == 0
+    assert usd_read.read_animation(out).frame_rate_hz == 60.0
+    assert out.read_bytes() == (studio / "dances" / "beat" / "graph.usdz").read_bytes()
+    loose = tmp_path / "elsewhere" / "waltz.usdc"
+    assert dance(studio, fps=60.0, out=loose).status == 0
+    assert (tmp_path / "elsewhere" / "song.wav").exists()
+    assert usd_read.read_animation(loose).frame_rate_hz == 60.0
+    assert dance(studio).status == 0
+    assert usd_read.read_animation(studio / "dances" / "beat" / "graph.usdz").frame_rate_hz == 30.0
+
+
+@pytest.mark.parametrize("name", ["beat", "beat.wav", "songs/beat.wav"])
+def test_a_song_goes_by_key_file_and_path(studio, name):
+    assert dance(studio, name).facts["song"] == "beat"
+
+
+def test_json_is_one_object_and_may_stand_last(built):
+    done = odori("dance", "beat", "--studio", built, "--json")
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert set(facts) >= {"stage", "usdz", "quality", "pins"}
+    assert Path(facts["usdz"]).is_file()
+    assert facts["pins"] == []
+
+
+def test_status_says_every_file_and_asset(built):
+    done = odori("status", "--json", env={"ODORI_STUDIO": str(built), "PATH": "/usr/bin:/bin"})
+    assert done.returncode == 0
+    facts = json.loads(done.stdout)
+    assert {c["path"] for c in facts["clips"]} == {str(p.relative_to(built)) for p in built.rglob("*.bvh")}
+    assert set(facts["clips"][0]) == {"path", "key", "session", "state", "reason"}
+    assert set(facts["songs"][0]) == {"path", "key", "state", "reason"}
+    assert {a["state"] for a in facts["assets"]} == {"fresh"}
+    assert facts["clips"][0]["reason"] is None
+
+
+def test_status_before_the_first_build(fresh_studio):
+    found = commands.status(fresh_studio)
+    assert {c["state"] for c in found.facts["clips"]} == {"new"}
+    assert "missing" in found.report
+
+
+def test_status_after_a_change(studio):
+    (studio / "clips" / "ayame" / "step.bvh").write_bytes((studio / "clips" / "ayame" / "wave.bvh").read_bytes())
+    found = commands.status(studio)
+    assert {c["state"] for c in found.facts["clips"] if "step" in c["path"]} == {"changed"}
+    assert "stale: clip[ayame]: sources changed" in found.report
+
+
+def test_check_of_a_good_a_damaged_and_a_missing_stage(built, tmp_path):
+    good = built / "dances" / "beat" / "graph.usdz"
+    assert odori("check", good).returncode == 0
+    half = tmp_path / "half.usdc"
+    half.write_bytes((built / "dances" / "beat" / "graph.usdc").read_bytes()[:2000])
+    done = odori("check", half, "--json")
+    assert done.returncode == 1
+    facts = json.loads(done.stdout)
+    assert not facts["is_valid"]
+    assert {"severity", "rule", "prim", "sentence"} == set(facts["findings"][0])
+    assert odori("check", tmp_path / "nowhere.usdz").returncode == 1
+
+
+@pytest.mark.parametrize("command", [[], ["build"], ["dance"], ["check"], ["status"], ["ui"], ["demo"]])
+def test_help_has_an_example(command):
+    done = odori(*command, "--help")
+    assert done.returncode == 0
+    assert not command or "odori " + command[0] in done.stdout
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [["dance"], ["dnace"], ["dance", "x", "--fps", "0"], ["dance", "x", "--fps", "many"], ["build", "--nonsense"]],
+)
+def test_usage_errors_end_with_two(wrong):
+    assert odori(*wrong).returncode == 2
+
+
+def test_wrong_method_and_wrong_suffix(built):
+    done = odori("dance", "beat", "--method", "ballet", "--studio", built)
+    assert done.returncode == 2
+    assert "want one of graph, got 'ballet'" in done.stderr
+    done = odori("dance", "beat", "--out", "x.fbx", "--studio", built)
+    assert done.returncode == 2
+    assert ".usdz or .usdc" in done.stderr
+
+
+def test_plain_report_goes_to_standard_output_only(built):
+    done = odori("build", "--studio", built)
+    assert "5 clips and 1 songs read" in done.stdout
+    assert done.stderr == ""
