@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+BLENDER := .venv-blender
 
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
@@ -12,8 +13,8 @@ $(STAMP): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' || \
 	  { echo "odori: want Python 3.11 or 3.12, got $$($(PYTHON) --version 2>&1); name one with 'make PYTHON=python3.11'"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
-	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv==0.13.9
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --compile-bytecode --require-hashes -r requirements.lock
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --no-deps --editable .
 	@touch $(STAMP)
 
@@ -31,8 +32,23 @@ lint: $(STAMP) ## style, types, import contracts
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-lock: ## resolve the dependencies anew
-	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
-	  --no-emit-find-links --no-header --extra dev pyproject.toml -o requirements.lock
+docs: $(STAMP) ## docs/data.md and docs/settings.md, from the declarations
+	@$(BIN)/python docs/generate.py
 
-.PHONY: help install demo test lint lock
+$(BLENDER)/.installed: requirements-blender.lock $(STAMP)
+	@$(BIN)/python -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+	  { echo "odori: bpy 4.5 wants Python 3.11, got $$($(BIN)/python --version); make a .venv of that"; exit 2; }
+	@test -x $(BLENDER)/bin/python || $(BIN)/python -m venv $(BLENDER)
+	@VIRTUAL_ENV=$(CURDIR)/$(BLENDER) $(BIN)/uv pip install --quiet --require-hashes -r requirements-blender.lock
+	@touch $@
+
+blender: $(BLENDER)/.installed ## Blender's Python module (0.9 GB), and the tests that open stages in it
+	@$(BIN)/python -m pytest -m blender
+
+lock: $(STAMP) ## resolve the dependencies anew
+	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate --no-emit-index-url \
+	  --no-emit-find-links --no-header --extra dev pyproject.toml -o requirements.lock
+	@echo 'bpy==4.5.*' | $(BIN)/uv pip compile - --quiet --python-version 3.11 --python-platform x86_64-manylinux_2_28 \
+	  --generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links --no-header -o requirements-blender.lock
+
+.PHONY: help install demo test lint docs blender lock

@@ -1,5 +1,7 @@
 """The beat grid over a song, the clock, and the cut to the song's length."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -106,5 +108,5 @@ def test_blends_never_overlap():
     assert width[4] == 0
     np.testing.assert_allclose(width[1:4], [0.3, 0.3, 0.3])
     reach = np.flatnonzero(seam)
-    for a, b in zip(reach[:-1], reach[1:], strict=True):
+    for a, b in itertools.pairwise(reach):
         assert start[a] + width[a] / 2 <= start[b] - width[b] / 2 + 1e-12

@@ -24,7 +24,7 @@ def test_body_is_whole_and_on_the_floor(label):
     assert legs.max() <= LEG_LENGTH_M + 1e-9
 
 
-@pytest.mark.parametrize("label", sorted(set(MOVES) - {"kick", "spin"})  # a kick lifts, a spin pivots)
+@pytest.mark.parametrize("label", sorted(set(MOVES) - {"kick", "spin"}))
 def test_planted_feet_stand_still(label):
     position = place(take(label, frame_rate_hz=60.0))
     contacts = find_contacts(position[:, ANKLE], position[:, TOES], frame_rate_hz=60.0, planted_height_m=(0.08, 0.02))
