@@ -14,14 +14,17 @@ STEP_S = 0.002
 WINDOW_S = 0.012
 N_BANDS = 24
 REACH_S = 0.040
+WIDE_REACH_S, NEAR_S, ELSEWHERE_RATIO = 0.080, 0.030, 3.0
 TRUST_S = 0.020
+SPAN_STEPS = 10
+LEAST_GAIN = 0.1
 ATTACK_LAG_S = -0.0031
 STIFFNESS = 20.0
 STRAY_S = 0.012
 N_ROUNDS = 4
 
 
-def attack_strength(samples: Samples, sample_rate_hz: float, centre_s: Float) -> Float:
+def attack_strength(samples: Samples, sample_rate_hz: float, centre_s: Float, *, reach_s: float) -> Float:
     """Measure how much sound sets in around given instants.
 
     Parameters
@@ -29,11 +32,13 @@ def attack_strength(samples: Samples, sample_rate_hz: float, centre_s: Float) ->
     samples : (n,) or (n, C) float, -1 to 1
     sample_rate_hz : float, > 0
     centre_s : (B,) float, seconds
+    reach_s : float, seconds, >= 0
 
     Returns
     -------
-    (B, 41) float64, >= 0
-        Summed rise of the square roots of 24 bands over 4 ms, in steps of 2 ms from 40 ms before to 40 ms after.
+    (B, 2 n + 1) float64, >= 0
+        Summed rise of the square roots of 24 bands over 4 ms, in n steps of 2 ms from ``reach_s`` before to as much
+        after; less where the sound as a whole does not grow over 20 ms.
     """
     mono = to_mono(samples)
     window = max(round(WINDOW_S * sample_rate_hz), 8)
@@ -42,15 +47,24 @@ def attack_strength(samples: Samples, sample_rate_hz: float, centre_s: Float) ->
     bin_hz = np.arange(n_fft // 2 + 1) * (sample_rate_hz / n_fft)
     edge_hz = np.geomspace(60.0, min(10000.0, sample_rate_hz / 2), N_BANDS + 1)
     weight = ((bin_hz[:, None] >= edge_hz[:-1]) & (bin_hz[:, None] < edge_hz[1:])).astype(np.float32)
-    n_steps = round(REACH_S / STEP_S)
-    offset_s = np.arange(-n_steps - 1, n_steps + 2) * STEP_S
+    n_steps = round(reach_s / STEP_S)
+    n_around = n_steps + SPAN_STEPS + 1
+    offset_s = np.arange(-n_around, n_around + 1) * STEP_S
     padded = np.pad(mono, (window, 2 * window))
     strength = np.zeros((len(centre_s), 2 * n_steps + 1))
     for i, time_s in enumerate(centre_s):
         start = np.rint((time_s + offset_s) * sample_rate_hz).astype(np.int64) + window - window // 2
         rows = padded[np.clip(start, 0, len(padded) - window)[:, None] + np.arange(window)] * hann
-        level = np.sqrt(np.abs(np.fft.rfft(rows, n_fft, axis=1)).astype(np.float32) @ weight)
-        strength[i] = np.maximum(level[2:] - level[:-2], 0.0).sum(axis=1)
+        size = np.abs(np.fft.rfft(rows, n_fft, axis=1)).astype(np.float32)
+        level = np.sqrt(size @ weight)
+        rise = np.maximum(level[2:] - level[:-2], 0.0).sum(axis=1)[SPAN_STEPS:-SPAN_STEPS]
+        # an attack leaves more sound than there was; the click where a tone is cut off leaves less
+        power = np.concatenate([[0.0], np.cumsum((size * size).sum(axis=1))])
+        here = np.arange(SPAN_STEPS + 1, SPAN_STEPS + 1 + len(rise))
+        after = power[here + SPAN_STEPS] - power[here]
+        before = power[here] - power[here - SPAN_STEPS]
+        grows = np.clip((after - before) / (after + before + 1e-12), 0.0, 1.0)
+        strength[i] = rise * (LEAST_GAIN + (1.0 - LEAST_GAIN) * grows)
     return strength
 
 
@@ -78,7 +92,8 @@ def snap_to_attacks(beat_s: Float, samples: Samples, sample_rate_hz: float) -> F
     n = len(beat_s)
     if n < 4:
         return np.asarray(beat_s, np.float64)
-    strength = attack_strength(samples, sample_rate_hz, beat_s)
+    beat_s = beat_s + _common_lag(beat_s, samples, sample_rate_hz)
+    strength = attack_strength(samples, sample_rate_hz, beat_s, reach_s=REACH_S)
     offset_s = (np.arange(strength.shape[1]) - strength.shape[1] // 2) * STEP_S
     near = strength * np.exp(-0.5 * (offset_s / TRUST_S) ** 2)
     best = np.argmax(near[:, 1:-1], axis=1) + 1
@@ -96,6 +111,17 @@ def snap_to_attacks(beat_s: Float, samples: Samples, sample_rate_hz: float) -> F
         weight = pull / (1.0 + ((attack_s - line) / STRAY_S) ** 2) + 1e-3
         line = _smooth(attack_s, weight)
     return line if (np.diff(line) > 0).all() else np.asarray(beat_s, np.float64)
+
+
+def _common_lag(beat_s: Float, samples: Samples, sample_rate_hz: float) -> float:
+    """Find out whether the attacks lie off all beats by one lag, in seconds, as with beeps whose end is heard best."""
+    strength = attack_strength(samples, sample_rate_hz, beat_s, reach_s=WIDE_REACH_S)
+    largest = strength.max(axis=1, keepdims=True)
+    common = (strength / np.maximum(largest, 1e-12)).mean(axis=0)
+    middle, near = len(common) // 2, round(NEAR_S / STEP_S)
+    best = int(common.argmax())
+    is_elsewhere = common[best] > ELSEWHERE_RATIO * common[middle - near : middle + near + 1].max()
+    return (best - middle) * STEP_S if is_elsewhere else 0.0
 
 
 def _smooth(value: Float, weight: Float) -> Float:

@@ -27,7 +27,7 @@ AUDIBLE_LEVEL = 0.02
 NEAR_S = 0.04
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class TempoCandidate:
     """One metrical level a listener might tap.
 

@@ -1,8 +1,6 @@
-"""How strongly something starts in each instant of a song: onset activations from sound."""
+"""What starts in each instant of a song: levels in mel bands and how they rise."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,27 +13,7 @@ FRAME_RATE_HZ = 100.0
 
 WINDOW_S = 0.0464
 LOWEST_HZ, HIGHEST_HZ, N_BANDS = 30.0, 11000.0, 80
-LOW_HZ, HIGH_HZ = 160.0, 3000.0
 FRAMES_AT_ONCE = 1024
-
-
-@dataclass(frozen=True, eq=False)
-class Onsets:
-    """Onset activations at :data:`FRAME_RATE_HZ`; frame i is centred on i / FRAME_RATE_HZ seconds.
-
-    Parameters
-    ----------
-    low, all_bands, high : (F,) float64, 0 to 1
-        Below 160 Hz, everything, and above 3 kHz.
-    """
-
-    low: Float
-    all_bands: Float
-    high: Float
-
-    def mix(self) -> Float:
-        """Weigh the bands into one activation, (F,), 0 to 1."""
-        return 0.5 * self.low + 0.3 * self.all_bands + 0.2 * self.high
 
 
 def to_mono(samples: Samples) -> NDArray[np.float32]:
@@ -88,7 +66,8 @@ def band_levels(samples: Samples, sample_rate_hz: float) -> tuple[Float, Float]:
 
     Returns
     -------
-    level : (F, D) float64, >= 0, F = floor(n / rate * FRAME_RATE_HZ) + 1, or 0 for no samples
+    level : (F, D) float64, 0 to 6.9, F = floor(n / rate * FRAME_RATE_HZ) + 1, or 0 for no samples
+        log(1 + 1000 r), r the level against the loudest of the song; 0 throughout when that is below -100 dB.
     centre_hz : (D,) float64
         Bands that fit under the Nyquist frequency.
 
@@ -143,52 +122,3 @@ def flux(level: Float) -> Float:
     rise = np.zeros_like(level, np.float64)
     rise[2:] = np.maximum(level[2:] - largest[:-2], 0.0)
     return rise
-
-
-def stand_out(curve: Float) -> Float:
-    """Keep what stands out of the half second around it, scaled by the song's 98th percentile.
-
-    Parameters
-    ----------
-    curve : (F,) float, >= 0
-
-    Returns
-    -------
-    (F,) float64, 0 to 1
-    """
-    if len(curve) == 0:
-        return np.zeros(0)
-    width = int(FRAME_RATE_HZ / 2)
-    total = np.concatenate([[0.0], np.cumsum(curve)])
-    low = np.maximum(np.arange(len(curve)) - width // 2, 0)
-    high = np.minimum(np.arange(len(curve)) + width // 2 + 1, len(curve))
-    above = np.maximum(curve - (total[high] - total[low]) / (high - low), 0.0)
-    strong = float(np.percentile(above, 98))
-    return np.clip(above / strong, 0.0, 1.0) if strong > 1e-9 else np.zeros(len(curve))
-
-
-def find_onsets(samples: Samples, sample_rate_hz: float) -> Onsets:
-    """Compute onset activations of a song.
-
-    Parameters
-    ----------
-    samples : (n,) or (n, C) float, -1 to 1
-    sample_rate_hz : float, > 0
-
-    Returns
-    -------
-    Onsets
-        Empty without samples; all zero for silence.
-
-    Raises
-    ------
-    ValueError
-        If a shape, a sample or the rate does not fit.
-    """
-    level, centre_hz = band_levels(samples, sample_rate_hz)
-    rise = flux(level)
-    return Onsets(
-        low=stand_out(rise[:, centre_hz < LOW_HZ].sum(axis=1)),
-        all_bands=stand_out(rise.sum(axis=1)),
-        high=stand_out(rise[:, centre_hz > HIGH_HZ].sum(axis=1)),
-    )

@@ -26,6 +26,7 @@ Weights = NDArray[np.float32]
 PULSE_RATE_HZ = FRAME_RATE_HZ / 2
 GROUP_EDGES_HZ = (0.0, 100.0, 200.0, 400.0, 800.0, 1600.0, 3000.0, 6000.0, 1e9)
 N_CHANNELS = 16
+LEAST_RISE = 0.03
 DILATIONS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 N_TAPS = 5
 
@@ -60,7 +61,7 @@ def pulse_features(level: Float, centre_hz: Float, change: Float) -> Float:
     out[:, 10] = colour[:, centre_hz >= 200.0].mean(axis=1)
     strong = np.percentile(out[:, :11], 97, axis=0)
     floor = np.concatenate([np.full(9, 0.1 * strong[:9].max()), np.full(2, 0.1 * strong[9:].max())])
-    out[:, :11] = np.log1p(2.0 * np.minimum(out[:, :11] / np.maximum(strong + floor, 1e-6), 2.0))
+    out[:, :11] = np.log1p(2.0 * np.minimum(out[:, :11] / np.maximum(strong + floor, LEAST_RISE), 2.0))
     loud = level.mean(axis=1)
     out[:, 11] = np.clip(_around(loud, -5, 6) - loud.mean(), -2.0, 2.0)
     beside = np.pad(out, ((1, 1), (0, 0)), mode="edge")

@@ -220,6 +220,10 @@ GROOVES = (
         bass=("roots", "kick"), chords=("triplets", "held", "arpeggio8"), weight=1.5,
     ),
     Groove(
+        "metronome", 46, 214, 4, 4, ("x...", "X...", "X...x...x...x..."), ("....",), ("....", "....", "..x."),
+        time_keys=(HAT, CLAVES, COWBELL), bass=("walking", "roots"), chords=("quarters", "held"), weight=1.5,
+    ),
+    Groove(
         "five", 88, 170, 5, 4,
         ("x.....x.....x.......", "x...........x......."), ("....X...........X...", "........X.......X..."),
         (EIGHTHS, QUARTERS),

@@ -150,15 +150,17 @@ def click_train(
 def _click(kind: str, rate_hz: int, rng: np.random.Generator) -> Float:
     """Make one click, (n,), full scale, starting at once."""
     t = np.arange(int(0.12 * rate_hz)) / rate_hz
+    fade = np.minimum(np.arange(len(t))[::-1] / (0.01 * rate_hz), 1.0)
     if kind == "tick":
         return np.asarray(np.cos(2 * np.pi * 3000.0 * t) * np.exp(-t / 0.002), np.float64)
     if kind == "beep":
         return np.asarray(np.sin(2 * np.pi * 1000.0 * t) * (t < 0.05), np.float64)
     if kind == "noise":
-        return np.asarray(np.clip(rng.standard_normal(len(t)), -2, 2) / 2 * np.exp(-t / 0.010), np.float64)
+        return np.asarray(fade * np.clip(rng.standard_normal(len(t)), -2, 2) / 2 * np.exp(-t / 0.010), np.float64)
     if kind == "block":
         return np.asarray(np.sin(2 * np.pi * 800.0 * t) * np.exp(-t / 0.015), np.float64)
-    return np.asarray(np.sin(2 * np.pi * (50.0 * t + 3.0 * (1 - np.exp(-t / 0.03)))) * np.exp(-t / 0.05), np.float64)
+    bent = 2 * np.pi * (50.0 * t + 3.0 * (1 - np.exp(-t / 0.03)))
+    return np.asarray(fade * np.sin(bent) * np.exp(-t / 0.05), np.float64)
 
 
 def drum_machine_song(
