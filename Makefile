@@ -32,8 +32,9 @@ lint: $(STAMP) ## style, types, import contracts
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-docs: $(STAMP) ## docs/data.md and docs/settings.md, from the declarations
+docs: $(STAMP) ## docs/data.md, docs/settings.md and docs/asset-graph.svg, from the declarations
 	@$(BIN)/python docs/generate.py
+	@$(BIN)/python docs/draw_graph.py
 
 $(BLENDER)/.installed: requirements-blender.lock $(STAMP)
 	@$(BIN)/python -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \

@@ -51,7 +51,6 @@ def load_clips(canonical_pose: Stored, steps: Choreography) -> dict[str, Clip]:
 def assembly(
     context: dg.AssetExecutionContext,
     choreography: pa.Table,
-    song: pa.Table,
     canonical_pose: Stored,
     studio: dg.ResourceParam[Studio],
     progress: dg.ResourceParam[Progress],

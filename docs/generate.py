@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 def data() -> str:
     """Every table: what a row is, its key, its columns with types, units and meanings."""
     parts = [
-        "# The tables\n\nMade by `make docs` from `schemas/`. Files: `lake/<table>/<partition>.parquet`; tables that are not\n"
+        "# The tables\n\nMade by `make docs` from `schemas/`. Files: `lake/<table>/<partition>.parquet`; tables not\n"
         "cut are `all.parquet`, those of a song and a method `<song>|<method>.parquet`. Frame tables have one row a\n"
         "frame; per-joint values are in the order of the schema metadata `joints`.\n"
     ]

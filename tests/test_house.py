@@ -87,6 +87,13 @@ def test_generated_pages_are_up_to_date():
         assert (REPOSITORY / "docs" / name).read_text() == text, f"docs/{name} lags behind; run 'make docs'"
 
 
+def test_picture_of_the_asset_graph_is_up_to_date():
+    spec = importlib.util.spec_from_file_location("draw_graph", REPOSITORY / "docs" / "draw_graph.py")
+    draw_graph = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(draw_graph)
+    assert (REPOSITORY / "docs" / "asset-graph.svg").read_text() == draw_graph.picture(), "run 'make docs'"
+
+
 def test_no_index_host_and_no_path_of_a_machine():
     # Put together from halves, so that this file does not find itself.
     hosts = "|".join(["py" + "pi.org", "python" + "hosted", "npm" + "js", "deb." + "debian"])
