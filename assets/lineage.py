@@ -10,11 +10,13 @@ an upstream rebuild with equal bytes leaves everything after it fresh. Stamps ho
 import hashlib
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import dagster as dg
 import pyarrow as pa
+from threadpoolctl import threadpool_limits
 
 from assets import tables
 from schemas.table import Table
@@ -176,6 +178,15 @@ def version_of(*parts: str) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
+def repeatable() -> AbstractContextManager[object]:
+    """Compute with one thread of linear algebra: more of them change last bits, and get in each other's way.
+
+    Libraries loaded inside the block are not reached; ``odori`` sets the environment for those as well.
+    """
+    limit: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
+    return limit
+
+
 def code_version(context: dg.AssetExecutionContext, asset: str) -> str:
     """Code version of an asset of this run."""
     return context.assets_def.code_versions_by_key[dg.AssetKey(asset)] or ""
@@ -212,16 +223,17 @@ def per_clip(
     before = earlier.table(table.name, key) if unchanged else None
     rows = tables.by_clip(before) if before is not None else {}
     parts, stamps, n_computed = [], {}, 0
-    for clip, version in made_from.items():
-        # A clip of no rows leaves none to carry, but its stamp says so.
-        is_carried = clip in unchanged and before is not None
-        part = rows.get(clip, table.empty()) if is_carried else compute(clip)
-        content = known[clip].content if is_carried else content_version(part)
-        n_computed += not is_carried
-        stamps[clip] = ClipStamp(version, content)
-        parts.append(part)
-        if progress:
-            progress.step()
+    with repeatable():
+        for clip, version in made_from.items():
+            # A clip of no rows leaves none to carry, but its stamp says so.
+            is_carried = clip in unchanged and before is not None
+            part = rows.get(clip, table.empty()) if is_carried else compute(clip)
+            content = known[clip].content if is_carried else content_version(part)
+            n_computed += not is_carried
+            stamps[clip] = ClipStamp(version, content)
+            parts.append(part)
+            if progress:
+                progress.step()
     metadata = {"computed_clips": n_computed, "carried_clips": len(made_from) - n_computed}
     return Part(key, _joined(table, parts), clips=stamps, metadata=metadata)
 

@@ -10,7 +10,7 @@ from assets import plots, tables
 from assets.declare import table_assets
 from assets.formats import audio, beats_file, midi
 from assets.formats.errors import FormatError
-from assets.lineage import Part, Parts, Progress, version_of
+from assets.lineage import Part, Parts, Progress, repeatable, version_of
 from assets.partitions import SONG, lake_key
 from assets.sources import Song, Studio, brief_version, song_version
 from kernels.music.beats import BeatAnalysis, TempoCandidate, track_beats
@@ -127,7 +127,8 @@ def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
         reason, heard = song.problem, None
         if not reason:
             try:
-                heard = listen(song, studio, studio.settings())
+                with repeatable():
+                    heard = listen(song, studio, studio.settings())
                 reason = _undanceable(heard)
             except (FormatError, OSError) as error:
                 reason = getattr(error, "what", "") or str(error)

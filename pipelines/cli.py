@@ -14,10 +14,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from assets.formats.errors import FormatError
-from pipelines.lake import LakeError
-from pipelines.resources import StudioError
-
+# Nothing of ours is imported here: --help answers at once, and main sets the environment before NumPy is loaded.
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
@@ -170,6 +167,10 @@ class _Trouble:
         return None
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        from assets.formats.errors import FormatError
+        from pipelines.lake import LakeError
+        from pipelines.resources import StudioError
+
         if isinstance(error, StudioError | LakeError | FormatError | LookupError | OSError):
             text = error.args[0] if isinstance(error, LookupError) and error.args else str(error)
             TROUBLE.print(f"odori: {text}")
@@ -188,6 +189,8 @@ def _progress() -> Callable[[], Any]:
 
 def main() -> None:
     """Run the command; ``--json`` may stand anywhere, also last."""
+    for library in ("OPENBLAS", "OMP", "MKL"):  # more threads change last bits: same inputs, same bytes
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     app()
 
 
