@@ -37,6 +37,10 @@ MOTION_GRAPH_EDGE = Table(
         f.CLIP_ID,
         Column("target_clip_id", pa.string(), "Clip after the seam."),
         Column("distance_score", pa.float32(), "Pose distance d(i,j); lower is closer."),
-        Column("edge_cost", pa.float32(), "Distance over how far both poses move there: d(i,j) / (d(i) + d(j)), equation 20 of JP5778523B2."),
+        Column(
+            "edge_cost",
+            pa.float32(),
+            "Distance over how far both poses move there: d(i,j) / (d(i) + d(j)), equation 20 of JP5778523B2.",
+        ),
     ),
 )
