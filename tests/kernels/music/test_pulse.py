@@ -80,8 +80,9 @@ def test_weights_fill_the_layers_exactly():
     assert all(np.isfinite(layer).all() for layer in pulse._layers())
 
 
-def test_dilated_convolution_by_hand():
+def test_dilated_convolution_by_hand(monkeypatch):
     """The network written out frame by frame gives the same."""
+    monkeypatch.setattr(pulse, "SPEEDS", (1.0,))
     x = np.random.default_rng(0).uniform(0, 1, (40, 16))
     layers = [np.asarray(layer, np.float64) for layer in pulse._layers()]
 
@@ -102,6 +103,19 @@ def test_dilated_convolution_by_hand():
         state = new
     by_hand = 1 / (1 + np.exp(-(state @ layers[-2] + layers[-1])))
     np.testing.assert_allclose(pulse_probability(x), by_hand, atol=1e-4)
+
+
+def test_speeds_are_averaged_in_log_odds(monkeypatch):
+    x = np.random.default_rng(1).uniform(0, 1, (200, 16))
+
+    def log_odds(*speeds):
+        monkeypatch.setattr(pulse, "SPEEDS", speeds)
+        p = pulse_probability(x)
+        return np.log(p / (1 - p))
+
+    together = log_odds(0.94, 1.0, 1.06)
+    np.testing.assert_allclose(together, (log_odds(0.94) + log_odds(1.0) + log_odds(1.06)) / 3, atol=1e-9)
+    assert np.abs(together - log_odds(1.0)).max() > 0.01
 
 
 def test_refuses_other_shapes():
