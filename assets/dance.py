@@ -6,6 +6,7 @@ from typing import Any
 
 import dagster as dg
 import numpy as np
+import polars as pl
 import pyarrow as pa
 
 from assets import plots, tables
@@ -135,12 +136,13 @@ def _check(name: str, measures: list[Measure]) -> dg.AssetCheckResult:
 
 def _seconds(clip: Stored) -> dict[str, float]:
     """Length of every clip that was read."""
-    return {
-        row["clip_id"]: row["duration_s"]
-        for key in clip.keys
-        for row in clip.read(key).select(["clip_id", "duration_s", "state"]).to_pylist()
-        if row["state"] == "read"
-    }
+    rows = pl.concat([_rows(clip.read(key)) for key in clip.keys])
+    return dict(rows.select("clip_id", "duration_s").iter_rows())
+
+
+def _rows(clip: pa.Table) -> pl.DataFrame:
+    """Take the clips that were read."""
+    return pl.DataFrame(clip).filter(pl.col("state") == "read")
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,15 +208,11 @@ def _sound(song: Mapping[str, Any], studio: Studio) -> Audio:
 
 
 def _provenance(song: Mapping[str, Any], method: str, steps: Choreography, clip: Stored) -> dict[str, Any]:
-    danced = set(steps.clip_id)
-    rows = [row for key in clip.keys for row in clip.read(key, clip_ids=danced).to_pylist() if row["state"] == "read"]
+    danced = pl.concat([_rows(clip.read(key, clip_ids=set(steps.clip_id))) for key in clip.keys])
     return {
         "method": method,
         "song": {"path": song["path"], "sha256": song["source_sha256"]},
-        "clips": [
-            {"clip_id": r["clip_id"], "path": r["path"], "sha256": r["source_sha256"], "licence": r["licence"]}
-            for r in rows
-        ],
+        "clips": danced.select("clip_id", "path", pl.col("source_sha256").alias("sha256"), "licence").to_dicts(),
     }
 
 

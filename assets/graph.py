@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import dagster as dg
 import numpy as np
+import polars as pl
+import pyarrow as pa
 
 from assets import plots, tables
 from assets.declare import table_assets
@@ -82,7 +84,8 @@ def motion_graph(
     ids, labels = [b.clip_id for b in beats], [b.label for b in beats]
     node = tables.from_motion_graph_node(graph, ids, index, labels, kept.is_kept)
     edge = tables.from_motion_graph_edge(graph, ids, found.distance)
-    yield dg.Output(Part("", node, metadata=_metadata(found, losses, settings.prune)), MOTION_GRAPH_NODE.name)
+    metadata = _metadata(found, losses, settings.prune) | {"labels": dg.MetadataValue.md(_by_label(node))}
+    yield dg.Output(Part("", node, metadata=metadata), MOTION_GRAPH_NODE.name)
     yield dg.Output(Part("", edge), MOTION_GRAPH_EDGE.name)
     yield dg.AssetCheckResult(
         check_name="goes_on",
@@ -131,6 +134,22 @@ def _of_no_beat(settings: MotionGraphSettings) -> BeatFeatures:
         time_s=np.zeros(0),
         metric=settings.metric,  # type: ignore[arg-type]
     )
+
+
+def _by_label(node: pa.Table) -> str:
+    """Tell what each label has in the graph: clips, beats, and how many of them a dance can use."""
+    counted = (
+        pl.DataFrame(node.select(["label", "clip_id", "is_kept"]))
+        .group_by("label")
+        .agg(
+            pl.col("clip_id").n_unique().alias("clips"),
+            pl.col("clip_id").filter("is_kept").n_unique().alias("clips danced"),
+            pl.len().alias("beats"),
+            pl.col("is_kept").sum().alias("beats danced"),
+        )
+        .sort("label")
+    )
+    return plots.markdown(counted.columns, counted.rows())
 
 
 def _metadata(found: Transitions, losses: dict[str, Pruned], chosen: str) -> dict[str, object]:

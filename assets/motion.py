@@ -52,7 +52,12 @@ def canonical_pose(
                 return CANONICAL_POSE.empty()
             rig, mapping = tables.to_skeleton(skeletons[clip])
             moved = tables.to_pose(poses[clip], rig)
-            return tables.from_canonical_pose(clip, moved.frame_rate_hz, retarget(moved, mapping))
+            try:
+                motion = retarget(moved, mapping)
+            except ValueError as error:  # a body that only now turns out to be none must not stop its session
+                context.log.warning(f"{clip}: left out of the canonical poses: {error}")
+                return CANONICAL_POSE.empty()
+            return tables.from_canonical_pose(clip, moved.frame_rate_hz, motion)
 
         return per_clip(CANONICAL_POSE, key, made_from, one, earlier=earlier, progress=progress)
 
