@@ -1,0 +1,263 @@
+"""Pins: what a director wants danced when, kept as promises or refused with the smallest set that cannot be.
+
+A pin admits some nodes in some music intervals; :func:`kernels.graph.path.find_path` then dances nothing else there.
+Whether pins can be kept asks for no prices, only for reachability, so a whole song is answered in milliseconds and
+sets of pins can be tried one after the other.
+
+JP5778523B2 gives labelled beats a soft attribute value instead (equations 23 to 26): a dance may ignore it when a seam
+costs more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.graph.costs import PathCosts
+from kernels.graph.path import STEPS
+from kernels.graph.program import Program
+from kernels.types import Float, Int, MotionGraph
+
+Mask = NDArray[np.bool_]
+
+FURTHEST_SHIFT = 16
+"""Beats by which a way out may move a pin."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pin:
+    """What may be danced in a stretch of the song.
+
+    Parameters
+    ----------
+    name : how a person calls it
+    first, last : int, music intervals first <= k < last
+    nodes : (N,) bool, where a step in those intervals may start
+
+    Raises
+    ------
+    ValueError
+        If the stretch is empty or begins before the song.
+    """
+
+    name: str
+    first: int
+    last: int
+    nodes: Mask
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.first < self.last:
+            raise ValueError(f"{self.name}: want 0 <= first < last music interval, got {self.first} to {self.last}")
+
+
+@dataclass(frozen=True)
+class WayOut:
+    """A change of one pin that would do.
+
+    Parameters
+    ----------
+    pin_index : int
+    shift_beats : int, music beats later; 0 where the wish changes instead
+    choice : name of what could be danced there instead, or ""
+    """
+
+    pin_index: int
+    shift_beats: int
+    choice: str
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """Why pins cannot be kept.
+
+    Parameters
+    ----------
+    pin_index : the fewest pins that cannot be kept together, in the order given
+    reason : "nothing" (no node is admitted), "tempo" (none fits the beats there within the bounds), "start" (none can
+        be reached from the start in time, or the end from it), or "path" (each can be kept, not all of them)
+    ways_out : nearest first, at most one shift and one choice a pin; empty where none was found
+    """
+
+    pin_index: tuple[int, ...]
+    reason: str
+    ways_out: tuple[WayOut, ...]
+
+
+def admitted(pins: Sequence[Pin], n_intervals: int, n_nodes: int) -> Mask:
+    """Which node may be danced in which music interval.
+
+    Parameters
+    ----------
+    pins : in any order; where they overlap, all must hold
+    n_intervals, n_nodes : int, K and N
+
+    Returns
+    -------
+    (K, N) bool; all True without pins
+
+    Raises
+    ------
+    ValueError
+        If a pin lies beyond the song or admits other nodes than N.
+    """
+    mask = np.ones((n_intervals, n_nodes), bool)
+    for pin in pins:
+        if pin.last > n_intervals:
+            raise ValueError(f"{pin.name}: want a place before music beat {n_intervals}, got {pin.first} to {pin.last}")
+        if pin.nodes.shape != (n_nodes,):
+            raise ValueError(f"{pin.name}: want ({n_nodes},) nodes, got {pin.nodes.shape}")
+        mask[pin.first : pin.last] &= pin.nodes
+    return mask
+
+
+class Reach:
+    """Whether a dance of a song can keep pins: the reachability part of the path's program, asked many times.
+
+    Parameters
+    ----------
+    graph : MotionGraph of N nodes
+    beat_s : (K + 1,) float64, seconds, strictly increasing
+    costs : PathCosts, for its bounds
+    steps : kinds of step (m, d)
+    starts : (M,) int64, nodes that may begin
+
+    Notes
+    -----
+    Bounds on the warp are the hard ones where the song can be danced within them at all, else the last-resort ones:
+    pins never make a dance leave bounds that it keeps without them.
+    """
+
+    def __init__(
+        self,
+        graph: MotionGraph,
+        beat_s: Float,
+        *,
+        costs: PathCosts,
+        starts: Int,
+        steps: tuple[tuple[int, int], ...] = STEPS,
+    ) -> None:
+        self._starts, self._steps = starts, steps
+        self.n_intervals, self.n_nodes = len(beat_s) - 1, len(graph.clip_index)
+        for self.bounds in (costs.hard_ratio, costs.last_resort_ratio):
+            program = Program(
+                graph, beat_s, steps=steps, costs=costs, admissible=None, bounds=self.bounds, outside_price=0.0
+            )
+            self._source, self._target, self._end = graph.source, graph.target, program.end
+            self._fits = [[self._fit(program, k, kind) for kind in range(len(steps))] for k in range(self.n_intervals)]
+            self.is_danceable = self.keeps(())
+            if self.is_danceable:
+                break
+
+    @staticmethod
+    def _fit(program: Program, beat: int, kind: int) -> Mask | None:
+        cost = program.step_cost(beat, kind)
+        return None if cost is None else np.isfinite(cost)
+
+    def keeps(self, pins: Sequence[Pin]) -> bool:
+        """Whether some dance of the whole song keeps all of these."""
+        return bool(self.arrivals(pins)[-1].any())
+
+    def arrivals(self, pins: Sequence[Pin]) -> Mask:
+        """Nodes where a step may have ended by each beat, keeping the pins until then: (K + 1, N) bool."""
+        mask = admitted(pins, self.n_intervals, self.n_nodes)
+        arrived = np.zeros((self.n_intervals + 1, self.n_nodes), bool)
+        for beat, fits in enumerate(self._fits):
+            ready = arrived[beat].copy()
+            ready[self._target[arrived[beat][self._source]]] = True
+            if beat == 0:
+                ready[self._starts] = True
+            if not ready.any():
+                continue
+            for (_, span), end, fit in zip(self._steps, self._end, fits, strict=True):
+                if fit is not None:
+                    can = ready & fit & mask[beat : beat + span].all(axis=0)
+                    arrived[beat + span][end[can]] = True
+        return arrived
+
+    def fits(self, pin: Pin) -> bool:
+        """Whether each interval of a pin has a node that is admitted and in tempo, reached or not."""
+        for k in range(pin.first, pin.last):
+            covered = False
+            for start in range(max(k - max(d for _, d in self._steps) + 1, 0), k + 1):
+                for (_, span), fit in zip(self._steps, self._fits[start], strict=True):
+                    covered |= fit is not None and start + span > k and bool((fit & pin.nodes).any())
+            if not covered:
+                return False
+        return True
+
+
+def find_conflict(reach: Reach, pins: Sequence[Pin], *, choices: Mapping[str, Mask] | None = None) -> Conflict | None:
+    """Find the fewest pins that cannot be kept together, and what would help.
+
+    Parameters
+    ----------
+    reach : Reach of a song that can be danced without pins
+    pins : as the director gave them
+    choices : other wishes to try in place of a conflicting one, by name: (N,) bool
+
+    Returns
+    -------
+    Conflict, or None when all pins can be kept
+        Of several smallest sets the first, pins in the order given.
+
+    Notes
+    -----
+    A set that cannot be kept cannot be kept with more in it. Leaving out pins one at a time gives a set that none can
+    be left out of; smaller ones are then looked for by size. That is a search over subsets, but of a director's pins:
+    a dozen, most of them far apart.
+    """
+    every = tuple(range(len(pins)))
+    if reach.keeps(pins):
+        return None
+    core = list(every)
+    for index in every:
+        fewer = [i for i in core if i != index]
+        if not reach.keeps([pins[i] for i in fewer]):
+            core = fewer
+    smallest = next(
+        (
+            chosen
+            for size in range(1, len(core))
+            for chosen in combinations(every, size)
+            if not reach.keeps([pins[i] for i in chosen])
+        ),
+        tuple(core),
+    )
+    return Conflict(smallest, _reason(reach, [pins[i] for i in smallest]), _ways_out(reach, pins, smallest, choices))
+
+
+def _reason(reach: Reach, pins: Sequence[Pin]) -> str:
+    if len(pins) > 1:
+        return "path"
+    if not pins[0].nodes.any():
+        return "nothing"
+    return "start" if reach.fits(pins[0]) else "tempo"
+
+
+def _ways_out(
+    reach: Reach, pins: Sequence[Pin], conflict: tuple[int, ...], choices: Mapping[str, Mask] | None
+) -> tuple[WayOut, ...]:
+    """Try to move each conflicting pin, nearest beats first, and to ask for something else there."""
+    found: list[WayOut] = []
+    for index in conflict:
+        pin = pins[index]
+        rest = [other for i, other in enumerate(pins) if i != index]
+        if not reach.keeps(rest):  # another conflict is left: mend this one first
+            rest = [pins[i] for i in conflict if i != index]
+        if pin.nodes.any():
+            for shift in sorted(range(-FURTHEST_SHIFT, FURTHEST_SHIFT + 1), key=lambda n: (abs(n), n)):
+                first, last = pin.first + shift, pin.last + shift
+                inside = shift and first >= 0 and last <= reach.n_intervals
+                if inside and reach.keeps([*rest, replace(pin, first=first, last=last)]):
+                    found.append(WayOut(index, shift, ""))
+                    break
+        for name, nodes in (choices or {}).items():
+            differs = not np.array_equal(nodes, pin.nodes)
+            if differs and reach.keeps([*rest, replace(pin, nodes=nodes)]):
+                found.append(WayOut(index, 0, name))
+                break
+    return tuple(sorted(found, key=lambda way: (way.choice != "", abs(way.shift_beats), way.pin_index)))

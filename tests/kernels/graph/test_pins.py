@@ -1,0 +1,146 @@
+"""Pins against every path there is, on small graphs."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from kernels.graph.costs import PathCosts
+from kernels.graph.path import STEPS, find_path
+from kernels.graph.pins import Pin, Reach, admitted, find_conflict
+
+NO_USAGE = PathCosts(usage=0.0)
+
+
+def reach_of(graph, beat_s, starts=None):
+    starts = np.arange(len(graph.clip_index)) if starts is None else starts
+    return Reach(graph, beat_s, costs=NO_USAGE, starts=starts)
+
+
+def is_kept(graph, beat_s, pins, bounds):
+    """Try every dance there is."""
+    n = len(beat_s) - 1
+    mask = admitted(pins, n, len(graph.clip_index))
+    jumps = {}
+    for s, t in zip(graph.source.tolist(), graph.target.tolist(), strict=True):
+        jumps.setdefault(s, []).append(t)
+
+    def dance(beat, ready):
+        if beat == n:
+            return True
+        for node in ready:
+            for m, d in STEPS:
+                end = node
+                for _ in range(m):
+                    end = int(graph.next_node[end]) if end >= 0 else -1
+                if end < 0 or beat + d > n or not mask[beat : beat + d, node].all():
+                    continue
+                ratio = (beat_s[beat + d] - beat_s[beat]) / (graph.time_s[end] - graph.time_s[node])
+                if bounds[0] <= ratio <= bounds[1] and dance(beat + d, [end, *jumps.get(end, [])]):
+                    return True
+        return False
+
+    return dance(0, range(len(graph.clip_index)))
+
+
+def random_case(seed, make_graph):
+    """Three short clips, a few one-way streets, up to four pins."""
+    rng = np.random.default_rng(seed)
+    beats = [np.cumsum(rng.uniform(0.42, 0.6, rng.integers(3, 6))) for _ in range(3)]
+    n = sum(map(len, beats))
+    pairs = {tuple(rng.integers(n, size=2)) for _ in range(5)}
+    graph = make_graph(beats, [(int(s), int(t), 0.3) for s, t in sorted(pairs) if s != t], both_ways=False)
+    beat_s = np.arange(int(rng.integers(3, 7))) * 0.5
+    pins = []
+    for i in range(int(rng.integers(1, 5))):
+        first = int(rng.integers(len(beat_s) - 1))
+        last = min(first + int(rng.integers(1, 3)), len(beat_s) - 1)
+        wanted = graph.clip_index == rng.integers(3)
+        pins.append(Pin(f"pin {i}", first, last, wanted if rng.random() < 0.7 else ~wanted))
+    return graph, beat_s, pins
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_kept_or_the_fewest_that_cannot_be(seed, make_graph):
+    graph, beat_s, pins = random_case(seed, make_graph)
+    reach = reach_of(graph, beat_s)
+    if not reach.is_danceable:
+        assert not is_kept(graph, beat_s, [], reach.bounds)
+        return
+    assert reach.keeps(pins) == is_kept(graph, beat_s, pins, reach.bounds)
+    conflict = find_conflict(reach, pins)
+    if conflict is None:
+        mask = admitted(pins, len(beat_s) - 1, len(graph.clip_index))
+        path = find_path(graph, beat_s, costs=NO_USAGE, starts="any", admissible=mask)
+        for beat, span, node in zip(path.beat_index, path.beat_span, path.source_node, strict=True):
+            assert mask[beat : beat + span, node].all()
+        return
+    assert not is_kept(graph, beat_s, [pins[i] for i in conflict.pin_index], reach.bounds)
+    for size in range(len(conflict.pin_index)):
+        for chosen in combinations(range(len(pins)), size):
+            assert is_kept(graph, beat_s, [pins[i] for i in chosen], reach.bounds)
+
+
+def test_conflicts_really_happen(make_graph):
+    """The cases above hold both: sets that are kept, and conflicts of one, of two and of more pins."""
+    sizes = set()
+    for seed in range(200):
+        graph, beat_s, pins = random_case(seed, make_graph)
+        reach = reach_of(graph, beat_s)
+        if reach.is_danceable:
+            conflict = find_conflict(reach, pins)
+            sizes.add(0 if conflict is None else len(conflict.pin_index))
+    assert {0, 1, 2} <= sizes
+
+
+@pytest.fixture
+def two_clips(make_graph):
+    """Two clips of six beats; from beat 2 of the first there is a way to the second, and none back."""
+    beats = np.arange(6) * 0.5
+    return make_graph([beats, beats], [(2, 7, 0.1)], both_ways=False)
+
+
+def test_reasons_and_ways_out(two_clips):
+    beat_s = np.arange(6) * 0.5
+    reach = reach_of(two_clips, beat_s, np.array([0]))
+    first, second = two_clips.clip_index == 0, two_clips.clip_index == 1
+    none = np.zeros(12, bool)
+
+    nothing = find_conflict(reach, [Pin("p", 0, 1, none)], choices={"first": first})
+    assert nothing.reason == "nothing"
+    assert [(w.shift_beats, w.choice) for w in nothing.ways_out] == [(0, "first")]
+
+    too_soon = find_conflict(reach, [Pin("p", 1, 2, second)])
+    assert too_soon.reason == "start"
+    assert too_soon.ways_out[0].shift_beats == 1
+
+    both = find_conflict(reach, [Pin("a", 3, 4, second), Pin("c", 0, 1, first), Pin("b", 4, 5, first)])
+    assert both.reason == "path"
+    assert both.pin_index == (0, 2)
+    assert find_conflict(reach, [Pin("a", 3, 4, second)]) is None
+    assert find_conflict(reach, []) is None
+
+
+def test_tempo_is_named(two_clips, make_graph):
+    graph = make_graph([np.arange(6) * 0.5, np.arange(3) * 5.0])
+    reach = reach_of(graph, np.arange(5) * 0.5)
+    assert find_conflict(reach, [Pin("slow", 1, 2, graph.clip_index == 1)]).reason == "tempo"
+
+
+def test_half_time_steps_must_be_admitted_throughout(make_graph):
+    """A step over two music beats of which one is pinned to another clip is no way."""
+    graph = make_graph([np.arange(4) * 1.0, np.arange(8) * 0.5])
+    reach = reach_of(graph, np.arange(5) * 0.5)
+    slow, fast = graph.clip_index == 0, graph.clip_index == 1
+    assert reach.keeps([Pin("slow", 0, 2, slow)]) is True
+    assert reach.keeps([Pin("slow", 0, 1, slow), Pin("fast", 1, 2, fast)]) is False
+
+
+def test_bad_pins(two_clips):
+    with pytest.raises(ValueError, match="first < last"):
+        Pin("p", 3, 3, np.ones(12, bool))
+    with pytest.raises(ValueError, match="before music beat 5"):
+        admitted([Pin("p", 4, 6, np.ones(12, bool))], 5, 12)
+    with pytest.raises(ValueError, match="nodes"):
+        admitted([Pin("p", 0, 1, np.ones(3, bool))], 5, 12)
+    assert admitted([], 2, 3).all()
