@@ -52,7 +52,7 @@ class Path:
     beat_span, motion_span : (S,) int64, >= 1, music and motion beats it covers
     has_transition : (S,) bool
         Whether it does not start where the step before ended.
-    transition_cost, warp_cost, repetition_cost, stride_cost, beat_cost : (S,) float64, >= 0
+    transition_cost, warp_cost, repetition_cost, stride_cost, beat_cost, diversity_cost : (S,) float64, >= 0
     warp_ratio : (S,) float64, song time ÷ clip time
     is_outside : (S,) bool, whether the ratio leaves the hard bounds
     """
@@ -68,13 +68,21 @@ class Path:
     repetition_cost: Float
     stride_cost: Float
     beat_cost: Float
+    diversity_cost: Float
     warp_ratio: Float
     is_outside: Mask
 
     @property
     def total_cost(self) -> float:
         """Sum of all components over all steps."""
-        parts = self.transition_cost, self.warp_cost, self.repetition_cost, self.stride_cost, self.beat_cost
+        parts = (
+            self.transition_cost,
+            self.warp_cost,
+            self.repetition_cost,
+            self.stride_cost,
+            self.beat_cost,
+            self.diversity_cost,
+        )
         return float(sum(part.sum() for part in parts))
 
 
@@ -88,6 +96,7 @@ def find_path(
     admissible: Mask | None = None,
     rounds: int = 3,
     strict: bool = False,
+    stretch_price: Float | None = None,
 ) -> Path:
     """Find the cheapest dance for a song.
 
@@ -105,6 +114,8 @@ def find_path(
         How often a dance is made to spread repetition; 0 prices it within the program only.
     strict : bool
         Refuse a dance that leaves the hard warp bounds anywhere.
+    stretch_price : (N,) float, >= 0, or None
+        Price of dancing from a node to the next, each time: what makes a second dance differ from a first.
 
     Returns
     -------
@@ -142,15 +153,26 @@ def find_path(
         raise ValueError(f"steps: want different pairs (motion beats, music beats), each >= 1, got {steps}")
     if admissible is not None and admissible.shape != (n_beats, n_nodes):
         raise ValueError(f"admissible: want ({n_beats}, {n_nodes}), got {admissible.shape}")
+    if stretch_price is not None and not (stretch_price.shape == (n_nodes,) and (stretch_price >= 0).all()):
+        raise ValueError(f"stretch_price: want ({n_nodes},), >= 0, got {stretch_price.shape}")
     if rounds < 0:
         raise ValueError(f"rounds: want >= 0, got {rounds}")
     start = _starts(graph, starts)
     if n_beats == 0:
         return _evaluate(None, [], costs, graph)
     most = _most_expensive(graph, beat_s, costs, steps)
+    if stretch_price is not None and n_nodes:
+        most += n_beats * max(m for m, _ in steps) * float(stretch_price.max())
     for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
         program = Program(
-            graph, beat_s, steps=steps, costs=costs, admissible=admissible, bounds=bounds, outside_price=price
+            graph,
+            beat_s,
+            steps=steps,
+            costs=costs,
+            admissible=admissible,
+            bounds=bounds,
+            outside_price=price,
+            stretch_price=stretch_price,
         )
         whole = program.solve(0, n_beats, after={n_beats: np.zeros(n_nodes)})
         if len(start) and np.isfinite(whole.start[0][start]).any():
@@ -226,7 +248,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     if program is None or not moves:
         none, no = np.zeros(0, np.int64), np.zeros(0, bool)
         zero = np.zeros(0)
-        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, no)
+        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, zero, no)
     span = np.array([d for _, d in program.steps])[kind]
     end = np.array([program.end[k][u] for _, u, k in moves], np.int64)
     seams = np.append(False, source[1:] != end[:-1])
@@ -235,6 +257,8 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     transition[seams], repetition[seams] = program.seam[edge], program.jump_back[edge]
     shown, shown_by = program.stretches(moves)
     np.add.at(repetition, shown_by, usage_cost(shown, program.n_nodes, costs))
+    diversity = np.zeros(len(moves))
+    np.add.at(diversity, shown_by, program.price[shown])
     ratio = (program.beat_s[beat + span] - program.beat_s[beat]) / (graph.time_s[end] - graph.time_s[source])
     stride = np.array([program.stride[k] for k in kind])
     return Path(
@@ -249,6 +273,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
         repetition_cost=repetition,
         stride_cost=stride,
         beat_cost=np.array([program.missed[k][u] for _, u, k in moves]),
+        diversity_cost=diversity,
         warp_ratio=ratio,
         is_outside=~is_within(ratio, costs.hard_ratio),
     )

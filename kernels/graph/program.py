@@ -53,6 +53,8 @@ class Program:
     outside_price : float, >= 0
         Added to a step outside the hard bounds: larger than any path costs otherwise, it makes their number the first
         thing to be minimised.
+    stretch_price : (N,) float64, >= 0, or None
+        Added to every stretch between a node and the next, whenever it is danced.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class Program:
         admissible: Mask | None,
         bounds: tuple[float, float],
         outside_price: float,
+        stretch_price: Float | None = None,
     ) -> None:
         self.graph, self.beat_s, self.steps, self.costs = graph, beat_s, steps, costs
         self.n_nodes, self.n_beats = len(graph.clip_index), len(beat_s) - 1
@@ -83,6 +86,7 @@ class Program:
                 end = np.where(end >= 0, graph.next_node[end], -1)
             self.end.append(end)
             self.clip_s.append(np.where(end >= 0, graph.time_s[end] - graph.time_s, np.inf))
+        self.price = np.zeros(self.n_nodes) if stretch_price is None else stretch_price
         self.missed = [beat_cost(graph, end, d, costs) for end, (_, d) in zip(self.end, steps, strict=True)]
 
     def step_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float | None:
@@ -127,7 +131,7 @@ class Program:
         first, last : int, 0 <= first <= last <= K
         after : by beat >= last, (N,) float64, cost to go on arrival there; a beat left out cannot be stepped onto
         price : (N,) float64 or None
-            Added to every stretch between a node and the next, whenever it is danced.
+            Added to every stretch between a node and the next, beside the program's own.
 
         Returns
         -------
@@ -197,8 +201,8 @@ class Program:
         return beat + self.steps[kind][1], int(self.end[kind][node])
 
     def stretch_price(self, price: Float | None) -> list[Float]:
-        """Prices of the stretches that each kind of step covers, summed: one (N,) a kind."""
-        price = np.zeros(self.n_nodes) if price is None else price
+        """Sum the prices of the stretches of each kind of step, the program's own and these: one (N,) a kind."""
+        price = self.price if price is None else self.price + price
         prices = []
         for motion_beats, _ in self.steps:
             total, node = np.zeros(self.n_nodes), np.arange(self.n_nodes)

@@ -367,3 +367,18 @@ def test_errors(make_graph):
     ]:
         with pytest.raises(ValueError, match=message):
             find_path(graph, **(good | change))
+
+
+def test_priced_stretches_are_avoided_and_accounted(make_graph):
+    """Two equal clips: the dance takes the one that is not priced, and pays where both are."""
+    beats = np.arange(6) * 0.5
+    graph = make_graph([beats, beats])
+    price = np.where(graph.clip_index == 0, 1.0, 0.0)
+    path = find_path(graph, beats, costs=NO_USAGE, stretch_price=price)
+    assert (graph.clip_index[path.source_node] == 1).all()
+    assert path.diversity_cost.sum() == 0
+    both = find_path(graph, beats, costs=NO_USAGE, stretch_price=price + 0.25)
+    assert both.diversity_cost.sum() == pytest.approx(0.25 * 5)
+    assert both.total_cost == pytest.approx(path.total_cost + 1.25)
+    with pytest.raises(ValueError, match="stretch_price"):
+        find_path(graph, beats, stretch_price=-price)

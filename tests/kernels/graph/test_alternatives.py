@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
+from kernels.graph.costs import PathCosts
+from kernels.graph.path import find_path
+
+NO_USAGE = PathCosts(usage=0.0)
+
+
+@pytest.fixture
+def three_clips(make_graph):
+    """Three clips at the song's tempo, the later the further from it, without transitions."""
+    return make_graph([np.arange(6) * 0.5, np.arange(6) * 0.51, np.arange(6) * 0.52])
+
+
+def dances(graph, n, diversity=1.0):
+    beat_s = np.arange(6) * 0.5
+    return find_alternatives(
+        graph,
+        n,
+        find=lambda price: find_path(graph, beat_s, costs=NO_USAGE, stretch_price=price),
+        diversity=diversity,
+    )
+
+
+def test_best_first_then_others(three_clips):
+    found = dances(three_clips, 3)
+    assert [int(three_clips.clip_index[path.source_node[0]]) for path in found] == [0, 1, 2]
+    assert shared_ratio(three_clips, found[0], found[1]) == 0
+    assert shared_ratio(three_clips, found[0], found[0]) == 1
+    assert found[0].diversity_cost.sum() == 0
+
+
+def test_alike_when_there_is_nothing_else(three_clips):
+    fourth = dances(three_clips, 4)[3]
+    assert fourth.diversity_cost.sum() > 0
+    assert shared_ratio(three_clips, dances(three_clips, 2, diversity=0.0)[1], fourth) == 1
+
+
+def test_price_of_stretch_and_clip(three_clips):
+    price = shown_price(three_clips, dances(three_clips, 1), diversity=2.0)
+    np.testing.assert_allclose(price, [2, 2, 2, 2, 2, 1] + [0] * 12)
+    assert not shown_price(three_clips, [], diversity=2.0).any()
+
+
+def test_bad_arguments(three_clips):
+    with pytest.raises(ValueError, match="n, diversity"):
+        dances(three_clips, 0)
+    with pytest.raises(ValueError, match="n, diversity"):
+        dances(three_clips, 1, diversity=-1.0)
