@@ -18,6 +18,7 @@ from assets.partitions import DANCE, EVERY, lake_key
 from assets.sources import Studio, request_of, request_version
 from kernels.assembly import quality
 from kernels.assembly.blend import assemble
+from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.quality import Measure
 from kernels.music.preview import render_preview
 from kernels.skeleton.canonical import CANONICAL
@@ -61,13 +62,16 @@ def assembly(
     key = lake_key(context.partition_key)
     song_id, method = key.split("|")
     steps = tables.to_choreography(choreography)
+    clips, settings = load_clips(canonical_pose, steps), studio.settings().dance
     dance = assemble(
         steps,
-        load_clips(canonical_pose, steps),
+        clips,
         skeleton=CANONICAL,
-        frame_rate_hz=request_of(studio, key).frame_rate_hz or studio.settings().dance.frame_rate_hz,
+        frame_rate_hz=request_of(studio, key).frame_rate_hz or settings.frame_rate_hz,
         duration_s=float(steps.song_end_s[-1]),
     )
+    if settings.lock_feet:
+        dance = lock_feet(dance, planted_feet(dance, steps, clips))
     progress.step()
     asked = request_version(studio, key)
     pose = tables.from_dance_pose(song_id, method, dance)
@@ -110,7 +114,7 @@ def dance_quality(
         "beats": [*quality.lag_measures(dance, steps, beat_s), *quality.beat_measures(dance, beat_s)],
         "warp": quality.warp_measures(steps),
         "seams": quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
-        "feet": quality.foot_measures(dance, steps, clips, skeleton=CANONICAL),
+        "feet": quality.foot_measures(dance, steps, clips),
         "catalogue": quality.catalogue_measures(steps, _seconds(clip)),
     }
     progress.step()

@@ -105,6 +105,7 @@ class DanceSettings(_Checked):
 
     frame_rate_hz: float = key(30.0, "Frames a second of the stage.", least=1, most=240)
     blend_s: float = key(0.4, "Song time over which two clips are blended, centred on the beat of the seam.", least=0)
+    lock_feet: bool = key(True, "Keep feet where they stand: root and legs give way to contacts of the clips.")
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kernels.assembly.blend import Dance, assemble, sample
+from kernels.assembly.feet import clip_contacts, planted_feet
 from kernels.assembly.timing import clock
 from kernels.motion import contacts
 from kernels.motion.velocity import jerk, kinematic_beats
-from kernels.skeleton import kinematics
+from kernels.skeleton import grounding, kinematics
 from kernels.types import Choreography, Clip, Float, Skeleton
 
 
@@ -302,7 +303,7 @@ def _longest_repeat(word: list[str]) -> int:
     return best
 
 
-def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton) -> list[Measure]:
+def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
     """Judge the feet: slide while planted beyond the source clips' own, and depth below the floor.
 
     Which foot is planted when is taken from the source clips through the lineage: blending must not get to decide what
@@ -310,44 +311,34 @@ def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip], 
 
     Parameters
     ----------
-    dance, steps, clips, skeleton : as :func:`kernels.assembly.blend.assemble` has them; the canonical skeleton
+    dance, steps, clips : as :func:`kernels.assembly.blend.assemble` has them, on the canonical skeleton
 
     Returns
     -------
     list of Measure
         Centimetres per second of contact, and centimetres.
     """
-    ankle = [skeleton.index(f"{side}Foot") for side in ("left", "right")]
-    toes = [skeleton.index(f"{side}Toes") for side in ("left", "right")]
-    rest_m = kinematics.rest_position(skeleton)
-    planted_m = float(rest_m[ankle[0], 1]), float(rest_m[toes[0], 1])
-    n = len(dance.time_s)
-    planted = np.zeros((2, n, 2), bool)
+    planted = planted_feet(dance, steps, clips)
     source_m = source_s = 0.0
     for clip_id in dict.fromkeys(steps.clip_id):
         clip = clips[clip_id]
         position, _ = kinematics.place(clip)
-        found = contacts.find_contacts(
-            position[:, ankle], position[:, toes], frame_rate_hz=clip.frame_rate_hz, planted_height_m=planted_m
-        )
+        found = clip_contacts(clip, position)
         frame = np.flatnonzero([steps.clip_id[s] == clip_id for s in dance.lineage.step_index])
         at = np.clip(np.round(dance.lineage.clip_time_s[frame] * clip.frame_rate_hz).astype(int), 0, clip.n_frames - 1)
-        planted[:, frame] = found.ankle[at], found.toes[at]
         used = np.zeros((clip.n_frames, 1), bool)
         used[at] = True
-        danced = contacts.FootContacts(found.ankle & used, found.toes & used, 0.0, *planted_m)
-        stood_s = float((danced.ankle | danced.toes).sum()) / clip.frame_rate_hz
-        slide = contacts.foot_slide(position[:, ankle], position[:, toes], danced, frame_rate_hz=clip.frame_rate_hz)
+        danced = replace(found, ankle=found.ankle & used, toes=found.toes & used)
+        stood_s = float(danced.foot.sum()) / clip.frame_rate_hz
+        slide = contacts.foot_slide(
+            position[:, grounding.ANKLES], position[:, grounding.TOES], danced, frame_rate_hz=clip.frame_rate_hz
+        )
         source_m, source_s = source_m + slide * stood_s, source_s + stood_s
-    ours = 100 * contacts.foot_slide(
-        dance.position_xyz_m[:, ankle],
-        dance.position_xyz_m[:, toes],
-        contacts.FootContacts(planted[0], planted[1], 0.0, *planted_m),
-        frame_rate_hz=dance.frame_rate_hz,
-    )
+    feet = dance.position_xyz_m[:, grounding.ANKLES], dance.position_xyz_m[:, grounding.TOES]
+    ours = 100 * contacts.foot_slide(*feet, planted, frame_rate_hz=dance.frame_rate_hz)
     source = 100 * source_m / source_s if source_s else 0.0
     limit = 0.2 * source
-    depth_cm = 100 * float(np.max(-dance.position_xyz_m[:, ankle + toes, 1], initial=0.0))
+    depth_cm = 100 * max(float(np.max(-point[..., 1], initial=0.0)) for point in feet)
     return [
         Measure("foot_slide_cm_per_s", ours),
         Measure("source_foot_slide_cm_per_s", source),

@@ -150,12 +150,48 @@ def plant_legs(
                 wanted[1] = height[k]
                 shift[a:b, side] = wanted - error
         shift[:, side] = _fade(shift[:, side], mask[0, :, side] | mask[1, :, side], n_fade)
-    out = orientation_wxyz.copy()
     if not np.abs(shift).max(initial=0.0) > 1e-6:
-        return out
+        return orientation_wxyz.copy()
+    return bend_legs(position_xyz_m, orientation_wxyz, shift, limit_rad=give.leg_limit_rad)
+
+
+def cancel_steps(weight: Float, step: Float, frame_rate_hz: float, *, give: Give, pull: float) -> Float:
+    """Find a displacement whose steps come near to wanted ones where they count, and which is slow and smooth besides.
+
+    Parameters
+    ----------
+    weight : (F - 1,) float, >= 0, of each step
+    step : (F - 1,) float, metres, the wanted steps times their weights
+    frame_rate_hz : float, > 0
+    give : Give, for the weight of added speed and the time of its changes
+    pull : float, per square second, > 0, weight of the displacement itself
+
+    Returns
+    -------
+    (F,) float64, metres
+    """
+    return _solve(len(weight) + 1, frame_rate_hz, give, step_weight=weight, step=step, pull=pull)
+
+
+def bend_legs(position_xyz_m: Float, orientation_wxyz: Float, shift_xyz_m: Float, *, limit_rad: float) -> Float:
+    """Turn thighs and shins so that the ankles move.
+
+    Parameters
+    ----------
+    position_xyz_m : (F, 22, 3) float, metres
+    orientation_wxyz : (F, 22, 4) float, world
+    shift_xyz_m : (F, 2, 3) float, metres, of the left and the right ankle
+    limit_rad : float, radians, most that a thigh or shin turns
+
+    Returns
+    -------
+    (F, 22, 4) float64, world orientations
+        Feet keep theirs. An ankle out of reach comes as near as the straight leg goes.
+    """
     hip, ankle = position_xyz_m[:, THIGHS], position_xyz_m[:, ANKLES]
     hinge = rotation.apply(orientation_wxyz[:, THIGHS], np.array([1.0, 0.0, 0.0]))
-    thigh, shin = _reach(hip, ankle, shift, hinge, give.leg_limit_rad)
+    thigh, shin = _reach(hip, ankle, shift_xyz_m, hinge, limit_rad)
+    out = orientation_wxyz.copy()
     out[:, THIGHS] = rotation.mul(thigh, orientation_wxyz[:, THIGHS])
     out[:, KNEES] = rotation.mul(shin, orientation_wxyz[:, KNEES])
     return out

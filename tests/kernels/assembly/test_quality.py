@@ -143,7 +143,7 @@ def test_repeat_of_a_loop_does_not_overlap_itself(phrases):
 def test_planted_feet_do_not_slide_and_a_dragged_dance_does(phrases, dance, clips):
     steps = phrases(("twist", 0.25, 8, 0.55, 0.55))
     made = dance(steps)
-    found = quality.foot_measures(made, steps, clips, skeleton=CANONICAL)
+    found = quality.foot_measures(made, steps, clips)
     assert values(found)["foot_slide_cm_per_s"] < 0.5
     assert values(found)["penetration_cm"] == 0
     drag = np.zeros(3)[None] + np.arange(len(made.time_s))[:, None] / 60 * np.array([0.2, 0.0, 0.0])
@@ -154,7 +154,7 @@ def test_planted_feet_do_not_slide_and_a_dragged_dance_does(phrases, dance, clip
         made.position_xyz_m + drag[:, None],
         made.lineage,
     )
-    found = quality.foot_measures(dragged, steps, clips, skeleton=CANONICAL)
+    found = quality.foot_measures(dragged, steps, clips)
     assert values(found)["added_foot_slide_cm_per_s"] == pytest.approx(20, abs=1)
     assert not passed(found)["added_foot_slide_cm_per_s"]
 
@@ -166,7 +166,7 @@ def test_sunken_feet_are_seen(phrases, dance, clips):
     sunk = type(made)(
         made.frame_rate_hz, made.root_xyz_m + down, made.rotation_wxyz, made.position_xyz_m + down, made.lineage
     )
-    found = quality.foot_measures(sunk, steps, clips, skeleton=CANONICAL)
+    found = quality.foot_measures(sunk, steps, clips)
     assert values(found)["penetration_cm"] == pytest.approx(3.0, abs=0.2)
     assert not passed(found)["penetration_cm"]
 
