@@ -52,7 +52,7 @@ class Path:
     beat_span, motion_span : (S,) int64, >= 1, music and motion beats it covers
     has_transition : (S,) bool
         Whether it does not start where the step before ended.
-    transition_cost, warp_cost, repetition_cost, stride_cost, beat_cost, diversity_cost : (S,) float64, >= 0
+    transition_cost, warp_cost, repetition_cost, stride_cost, beat_cost, diversity_cost, wish_cost : (S,) float64, >= 0
     warp_ratio : (S,) float64, song time ÷ clip time
     is_outside : (S,) bool, whether the ratio leaves the hard bounds
     """
@@ -69,6 +69,7 @@ class Path:
     stride_cost: Float
     beat_cost: Float
     diversity_cost: Float
+    wish_cost: Float
     warp_ratio: Float
     is_outside: Mask
 
@@ -82,6 +83,7 @@ class Path:
             self.stride_cost,
             self.beat_cost,
             self.diversity_cost,
+            self.wish_cost,
         )
         return float(sum(part.sum() for part in parts))
 
@@ -97,6 +99,7 @@ def find_path(
     rounds: int = 3,
     strict: bool = False,
     stretch_price: Float | None = None,
+    interval_price: Float | None = None,
 ) -> Path:
     """Find the cheapest dance for a song.
 
@@ -116,6 +119,8 @@ def find_path(
         Refuse a dance that leaves the hard warp bounds anywhere.
     stretch_price : (N,) float, >= 0, or None
         Price of dancing from a node to the next, each time: what makes a second dance differ from a first.
+    interval_price : (K, N) float, >= 0, or None
+        Price of dancing music interval k with a step that starts at the node: soft wishes.
 
     Returns
     -------
@@ -155,6 +160,8 @@ def find_path(
         raise ValueError(f"admissible: want ({n_beats}, {n_nodes}), got {admissible.shape}")
     if stretch_price is not None and not (stretch_price.shape == (n_nodes,) and (stretch_price >= 0).all()):
         raise ValueError(f"stretch_price: want ({n_nodes},), >= 0, got {stretch_price.shape}")
+    if interval_price is not None and not (interval_price.shape == (n_beats, n_nodes) and (interval_price >= 0).all()):
+        raise ValueError(f"interval_price: want ({n_beats}, {n_nodes}), >= 0, got {interval_price.shape}")
     if rounds < 0:
         raise ValueError(f"rounds: want >= 0, got {rounds}")
     start = _starts(graph, starts)
@@ -163,6 +170,8 @@ def find_path(
     most = _most_expensive(graph, beat_s, costs, steps)
     if stretch_price is not None and n_nodes:
         most += n_beats * max(m for m, _ in steps) * float(stretch_price.max())
+    if interval_price is not None and interval_price.size:
+        most += n_beats * float(interval_price.max())
     for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
         program = Program(
             graph,
@@ -173,6 +182,7 @@ def find_path(
             bounds=bounds,
             outside_price=price,
             stretch_price=stretch_price,
+            interval_price=interval_price,
         )
         whole = program.solve(0, n_beats, after={n_beats: np.zeros(n_nodes)})
         if len(start) and np.isfinite(whole.start[0][start]).any():
@@ -248,7 +258,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     if program is None or not moves:
         none, no = np.zeros(0, np.int64), np.zeros(0, bool)
         zero = np.zeros(0)
-        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, zero, no)
+        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, zero, zero, no)
     span = np.array([d for _, d in program.steps])[kind]
     end = np.array([program.end[k][u] for _, u, k in moves], np.int64)
     seams = np.append(False, source[1:] != end[:-1])
@@ -274,6 +284,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
         stride_cost=stride,
         beat_cost=np.array([program.missed[k][u] for _, u, k in moves]),
         diversity_cost=diversity,
+        wish_cost=np.array([program.interval_cost(k, i, np.array([u]))[0] for k, u, i in moves]),
         warp_ratio=ratio,
         is_outside=~is_within(ratio, costs.hard_ratio),
     )

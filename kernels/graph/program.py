@@ -55,6 +55,8 @@ class Program:
         thing to be minimised.
     stretch_price : (N,) float64, >= 0, or None
         Added to every stretch between a node and the next, whenever it is danced.
+    interval_price : (K, N) float, >= 0, or None
+        Added where music interval k is danced with a step that starts at the node.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class Program:
         bounds: tuple[float, float],
         outside_price: float,
         stretch_price: Float | None = None,
+        interval_price: Float | None = None,
     ) -> None:
         self.graph, self.beat_s, self.steps, self.costs = graph, beat_s, steps, costs
         self.n_nodes, self.n_beats = len(graph.clip_index), len(beat_s) - 1
@@ -86,6 +89,7 @@ class Program:
                 end = np.where(end >= 0, graph.next_node[end], -1)
             self.end.append(end)
             self.clip_s.append(np.where(end >= 0, graph.time_s[end] - graph.time_s, np.inf))
+        self._interval_price = interval_price
         self.price = np.zeros(self.n_nodes) if stretch_price is None else stretch_price
         self.missed = [beat_cost(graph, end, d, costs) for end, (_, d) in zip(self.end, steps, strict=True)]
 
@@ -103,9 +107,17 @@ class Program:
             fits &= self._admissible[beat : beat + music_beats, nodes].all(axis=0)
         cost = np.full(ratio.shape, np.inf)
         cost[fits] = warp_cost(ratio[fits], self.costs) + self.stride[kind] + self.missed[kind][nodes][fits]
+        if self._interval_price is not None:
+            cost += self.interval_cost(beat, kind, nodes)
         if self._outside_price:
             cost[fits & ~is_within(ratio, self.costs.hard_ratio)] += self._outside_price
         return cost
+
+    def interval_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float:
+        """Price of the music intervals that a kind of step covers, danced from the nodes; zeros where none is set."""
+        if self._interval_price is None:
+            return np.zeros(len(np.arange(self.n_nodes)[nodes]))
+        return np.asarray(self._interval_price[beat : beat + self.steps[kind][1], nodes].sum(axis=0), np.float64)
 
     def relax(self, start: Float) -> Float:
         """Cost on arrival from the costs of starting a step: with the best transition, or none."""

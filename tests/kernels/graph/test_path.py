@@ -382,3 +382,19 @@ def test_priced_stretches_are_avoided_and_accounted(make_graph):
     assert both.total_cost == pytest.approx(path.total_cost + 1.25)
     with pytest.raises(ValueError, match="stretch_price"):
         find_path(graph, beats, stretch_price=-price)
+
+
+def test_soft_wishes_cost_and_can_be_overruled(make_graph):
+    """A wished clip is danced where the way to it is cheaper than doing without it, and not where it is dearer."""
+    beats = np.arange(7) * 0.5
+    graph = make_graph([beats, beats], [(2, 9, 0.5), (10, 3, 0.5)], both_ways=False)
+    wish = np.zeros((6, 14))
+    wish[2:4, graph.clip_index == 0] = 1.0
+    path = find_path(graph, beats, costs=NO_USAGE, starts=np.array([0]), interval_price=5.0 * wish)
+    assert graph.clip_index[path.source_node].tolist()[2:4] == [1, 1]
+    assert path.wish_cost.sum() == 0
+    weak = find_path(graph, beats, costs=NO_USAGE, starts=np.array([0]), interval_price=0.2 * wish)
+    assert (graph.clip_index[weak.source_node] == 0).all()
+    assert weak.wish_cost.sum() == pytest.approx(0.4)
+    with pytest.raises(ValueError, match="interval_price"):
+        find_path(graph, beats, interval_price=wish[:, :3])
