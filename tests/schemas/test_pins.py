@@ -1,0 +1,52 @@
+"""Pins as directors write them."""
+
+import pytest
+
+from schemas.pins import PinWish, parse_pin
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("42=spin", PinWish(at=42.0, label="spin")),
+        ("0=spin", PinWish(at=0.0, label="spin")),
+        ("12.5-16=clip:ayame-step_01", PinWish(at=12.5, until=16.0, clip="ayame-step_01")),
+        ("beat:8-16=not:walk", PinWish(beat=8, until_beat=16, not_label="walk")),
+        ("bar:3=style:hip hop", PinWish(bar=3, style="hip hop")),
+        ("bar:3-3=label:a:b", PinWish(bar=3, until_bar=3, label="a:b")),
+        ("start=clip:x", PinWish(place="start", clip="x")),
+        (" 42 = spin = turn ", PinWish(at=42.0, label="spin = turn")),
+        ("1=踊り", PinWish(at=1.0, label="踊り")),
+    ],
+)
+def test_read_and_written_back(text, wanted):
+    assert parse_pin(text) == wanted
+    assert parse_pin(wanted.text) == wanted
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("spin", "want PLACE=WISH"),
+        ("=spin", "want PLACE=WISH"),
+        ("x=spin", "want PLACE=WISH"),
+        ("-3=spin", "want PLACE=WISH"),
+        ("42=", "want one wish"),
+        ("42=clip:", "want one wish"),
+        ("16-12=spin", "until after at"),
+        ("16-16=spin", "until after at"),
+        ("beat:0=spin", "want one place"),
+        ("beat:5-5=spin", "until_beat after beat"),
+        ("bar:4-3=spin", "until_bar after bar"),
+    ],
+)
+def test_what_is_no_pin_says_why(text, word):
+    with pytest.raises(ValueError, match=word):
+        parse_pin(text)
+
+
+def test_one_place_and_one_wish():
+    with pytest.raises(ValueError, match="got more"):
+        PinWish(at=1.0, beat=2, label="x")
+    with pytest.raises(ValueError, match="label and style"):
+        PinWish(at=1.0, label="x", style="y")
