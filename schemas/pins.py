@@ -117,7 +117,7 @@ def parse_pin(text: str) -> PinWish:
         values["label"] = wish
     if not (equals and values and (where in ("start", "end") or seconds or counted)):
         raise ValueError(
-            f"pin: want PLACE=WISH, as in 42=spin, 12.5-16=clip:KEY, beat:8-16=not:walk, bar:3=style:waltz, got {text!r}"
+            f"pin: want PLACE=WISH, as in 42=spin, 12.5-16=clip:KEY, beat:8-16=not:walk or bar:3=waltz, got {text!r}"
         )
     try:
         return PinWish(**values)  # type: ignore[arg-type]  # the names are those of its fields
