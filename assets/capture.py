@@ -60,6 +60,9 @@ def capture(
         yield dg.Output(Parts(parts), name)
 
 
+_UNREAD = "cannot be read"
+
+
 class _Reader:
     """Reads sessions, carrying over what an earlier run read of files with the same bytes."""
 
@@ -73,6 +76,7 @@ class _Reader:
         known = self._carried(session)
         rows, stamps, n_read = [], {}, 0
         skeletons, poses = {}, {}
+        is_unread = False
         for clip in clips:
             made_from = version_of(self._reading, clip.sha256)
             if clip.problem:
@@ -82,13 +86,15 @@ class _Reader:
             else:
                 row, skeletons[clip.key], poses[clip.key] = self._parse(clip)
                 n_read += 1
+                is_unread |= row["state"] == "refused" and str(row["reason"]).startswith(_UNREAD)
             rows.append(_row(clip, row))
-            if not clip.problem:
+            if not clip.problem and not str(rows[-1]["reason"] or "").startswith(_UNREAD):
                 stamps[clip.key] = made_from
             self._progress.step()
         counts = {"computed_clips": n_read, "carried_clips": len(clips) - n_read}
         refused = [f"{r['path']}: {r['reason']}" for r in rows if r["state"] == "refused"]
-        version = session_version(clips)
+        # What the disk refused may be readable next time: such a session is never taken for fresh.
+        version = version_of(session_version(clips), "unread") if is_unread else session_version(clips)
         by_clip = {row["clip_id"]: tables.from_rows(CLIP, [row]) for row in rows if row["source_sha256"]}
         return {
             POSE.name: Part(session, tables.concat(POSE, _filled(poses)), version, _stamps(stamps, poses), counts),
@@ -106,20 +112,23 @@ class _Reader:
 
     def _carried(self, session: str) -> dict[str, tuple[str, dict[str, object], pa.Table, pa.Table]]:
         """Look up what is known of each clip: what it was read from, its row, its skeleton, its pose."""
-        stamp = self._earlier.stamp(POSE.name, session)
+        stamps = [self._earlier.stamp(table.name, session) for table in (POSE, SKELETON, CLIP)]
         clip, skeleton, pose = (self._earlier.table(t.name, session) for t in (CLIP, SKELETON, POSE))
-        if stamp is None or clip is None or skeleton is None or pose is None:
+        if any(stamp is None for stamp in stamps) or clip is None or skeleton is None or pose is None:
             return {}
+        # The three are stored one after the other: after a kill in between they may be of different readings.
+        made_from = [{c: s.made_from for c, s in stamp.clips.items()} for stamp in stamps if stamp]
+        agreed = {c for c, version in made_from[0].items() if all(m.get(c) == version for m in made_from)}
         skeletons, poses = tables.by_clip(skeleton), tables.by_clip(pose)
         return {
             row["clip_id"]: (
-                stamp.clips[row["clip_id"]].made_from,
+                made_from[0][row["clip_id"]],
                 row,
                 skeletons.get(row["clip_id"], SKELETON.empty()),
                 poses.get(row["clip_id"], POSE.empty()),
             )
             for row in clip.to_pylist()
-            if row["clip_id"] in stamp.clips and row["source_sha256"]
+            if row["clip_id"] in agreed and row["source_sha256"]
         }
 
     def _parse(self, source: Clip) -> tuple[dict[str, object], pa.Table, pa.Table]:
@@ -171,7 +180,7 @@ def _sentence(error: Exception) -> str:
     if isinstance(error, FormatError):
         return f"line {error.line}: {error.what}" if error.line else error.what
     if isinstance(error, OSError):
-        return f"cannot be read: {error.strerror or error}; see to the file"
+        return f"{_UNREAD}: {error.strerror or error}; see to the file"
     return str(error)
 
 

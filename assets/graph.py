@@ -110,6 +110,8 @@ def _session(
     poses = tables.by_clip(canonical_pose.read(key, clip_ids=beats)) if beats else {}
     found = []
     for clip_id, rows in beats.items():
+        if clip_id not in labels or clip_id not in poses:  # beats of an earlier build whose renewal failed
+            continue
         moved = tables.to_canonical_pose(poses[clip_id])
         time_s = np.minimum(tables.to_numbers(rows["time_s"]), moved.duration_s)
         features = beat_features(

@@ -87,7 +87,7 @@ def listen(song: Song, studio: Studio, settings: Settings) -> Heard:
         decoded = audio.read(place, limit_s=settings.limits.longest_song_s)
         sound, rate_hz, n_channels = decoded.samples, decoded.sample_rate_hz, decoded.samples.shape[1]
         duration_s = decoded.duration_s
-        analysis = track_beats(sound, rate_hz)
+        analysis = track_beats(sound, rate_hz, tracker=settings.music_beat.tracker)
     time_s, level_db = loudness_db(sound, rate_hz, frame_rate_hz=LOUDNESS_RATE_HZ)
     analysis = _as_briefed(analysis, studio.brief(song).beats, studio, song)
     return Heard(duration_s, 0 if song.kind == "midi" else rate_hz, n_channels, analysis, time_s, level_db)
@@ -121,8 +121,7 @@ def _level_of(grid: BeatGrid) -> tuple[TempoCandidate, ...]:
 def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
     """Make the tables of one song; a refused one gets its row and no beats."""
     version = version_of(song_version(songs), brief_version(studio, songs))
-    parts = {table.name: Part(key, table.empty(), version) for table in _TABLES}
-    rows = []
+    rows, danceable = [], None
     for song in songs:
         reason, heard = song.problem, None
         if not reason:
@@ -130,12 +129,17 @@ def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
                 with repeatable():
                     heard = listen(song, studio, studio.settings())
                 reason = _undanceable(heard)
-            except (FormatError, OSError) as error:
+            except (FormatError, ValueError) as error:
                 reason = getattr(error, "what", "") or str(error)
+            except OSError as error:  # may be readable next time: never taken for fresh
+                reason = f"cannot be read: {error.strerror or error}; see to the file"
+                version = version_of(version, "unread")
         rows.append(_row(song, heard, reason))
         if heard is not None and not reason:
-            parts |= _heard_parts(key, heard, version)
+            danceable = heard
     refused = [f"{r['path']}: {r['reason']}" for r in rows if r["reason"]]
+    parts = {table.name: Part(key, table.empty(), version) for table in _TABLES}
+    parts |= _heard_parts(key, danceable, version) if danceable else {}
     parts[schema.SONG.name] = Part(
         key, tables.from_rows(schema.SONG, rows), version, metadata={"refusals": "; ".join(refused) or "none"}
     )

@@ -162,7 +162,7 @@ def scan(studio: Path, limits: Settings, *, sessions_in_use: Iterable[str] = (),
     now_ns = time.time_ns()
     notes: list[str] = []
     clips = _clips(studio, limits, dict(parts_in_use(list(sessions_in_use))), cache, now_ns, notes)
-    songs = _songs(studio, limits, cache, now_ns)
+    songs = _songs(studio, limits, cache, now_ns, notes)
     cache.save()
     return Sources(tuple(clips), tuple(songs), tuple(notes))
 
@@ -171,7 +171,7 @@ def _clips(
     studio: Path, limits: Settings, known_parts: Mapping[str, int], cache: HashCache, now_ns: int, notes: list[str]
 ) -> list[Clip]:
     root = studio / "clips"
-    files = tree.walk(root)
+    files = tree.walk(root, notes)
     facts = _facts(root, [f for f in files if clips_csv.is_clips_csv(f.name)], notes)
     sources = [f for f in files if f.suffix not in DOCUMENT_SUFFIXES]
     by_folder: dict[tuple[str, ...], list[File]] = defaultdict(list)
@@ -187,7 +187,7 @@ def _clips(
             session = part_key(folder_key, part_of(file.name, n_parts), n_parts) if n_parts > 1 else folder_key
             path = f"clips/{file.path}"
             problem = _unreadable(file, MOTION_SUFFIXES, limits.limits.largest_clip_mb, "a BVH file (.bvh)")
-            digest = "" if problem else cache.sha256(root, file, now_ns)
+            digest, problem = ("", problem) if problem else _hashed(root, file, cache, now_ns)
             if not problem and taken.setdefault(key, path) != path:
                 problem = f"want its own key, got {key!r}, which {taken[key]} has; rename one of the two files"
             clips.append(Clip(key, session, path, "" if problem else digest, _facts_of(facts, file), problem))
@@ -225,6 +225,14 @@ def _facts_of(said: Iterable[tuple[tuple[str, ...], dict[str, Facts]]], file: Fi
     return Facts(label=fallback)
 
 
+def _hashed(root: Path, file: File, cache: HashCache, now_ns: int) -> tuple[str, str]:
+    """Hash a file; or nothing, and why it cannot be read."""
+    try:
+        return cache.sha256(root, file, now_ns), ""
+    except OSError as error:
+        return "", f"cannot be read: {error.strerror or error}; see to the file and its permissions"
+
+
 def _unreadable(file: File, suffixes: tuple[str, ...], largest_mb: float, wanted: str) -> str:
     if file.suffix not in suffixes:
         return f"want {wanted}, got {file.suffix!r}; export or unpack it as one"
@@ -233,9 +241,9 @@ def _unreadable(file: File, suffixes: tuple[str, ...], largest_mb: float, wanted
     return ""
 
 
-def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int) -> list[Song]:
+def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int, notes: list[str]) -> list[Song]:
     root = studio / "songs"
-    files = tree.walk(root)
+    files = tree.walk(root, notes)
     briefs = {f.path for f in files if f.name.endswith(".brief.toml")}
     sources = [f for f in files if f.suffix not in DOCUMENT_SUFFIXES]
     order = {suffix: i for i, suffix in enumerate(AUDIO_SUFFIXES + MIDI_SUFFIXES)}
@@ -259,12 +267,13 @@ def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int) -> lis
             other = taken.setdefault(key, file)
             if other is not file:
                 problem = f"want its own key, got {key!r}, which songs/{other.path} has; rename one of the two files"
+        digest, problem = ("", problem) if problem else _hashed(root, file, cache, now_ns)
         brief = next((b for b in (f"{file.path}.brief.toml", _sibling(file, "brief.toml")) if b in briefs), "")
         songs.append(
             Song(
                 key,
                 f"songs/{file.path}",
-                "" if problem else cache.sha256(root, file, now_ns),
+                digest,
                 kind,
                 f"songs/{brief}" if brief else "",
                 problem,

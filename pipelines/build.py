@@ -6,14 +6,15 @@ Dagster runs on the studio's own instance, so the UI shows them like any other.
 
 import fcntl
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import dagster as dg
 from dagster_shared.error import SerializableErrorInfo
 
-from assets.partitions import SESSION, SONG, dagster_key
+from assets.partitions import SESSION, SONG, dagster_key, lake_key
 from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP
 from pipelines.lake import why
@@ -85,6 +86,8 @@ def plan(
     *,
     groups: Iterable[str],
     keys: Callable[[str, str], bool] | None = None,
+    tried: Collection[Batch] = (),
+    given_up: Collection[tuple[str, str]] = (),
 ) -> list[Batch]:
     """Plan the first stage that has something to do.
 
@@ -95,20 +98,24 @@ def plan(
         Its order of dynamic partitions decides which are neighbours.
     groups : groups of assets that may run
     keys : of (kind, key), whether a partition may run; None for all
+    tried : batches not to be planned again
+    given_up : (asset, partition) that could not be made: what reads every partition goes on without them
 
     Returns
     -------
     list of Batch
-        Empty when everything asked for is fresh.
+        Empty when everything asked for is fresh or was tried.
     """
     wanted = set(groups)
-    findings = [f for f in state.findings() if state.assets[f.asset].group in wanted]
+    findings = [f for f in state.findings(given_up=given_up) if state.assets[f.asset].group in wanted]
     if keys is not None:
         findings = [f for f in findings if keys(state.assets[f.asset].kind, f.key)]
     for stage in STAGES:
         todo = [f for f in findings if state.assets[f.asset].group in stage and f.state != "fresh"]
         if any(f.state != "waiting" for f in todo):
-            return _batches(todo, state, instance)
+            batches = [batch for batch in _batches(todo, state, instance) if batch not in tried]
+            if batches:
+                return batches
     return []
 
 
@@ -150,14 +157,16 @@ def execute(batch: Batch, definitions: dg.Definitions, instance: dg.DagsterInsta
         instance=instance,
         asset_selection=[dg.AssetKey(asset) for asset in batch.assets],
         partition_key=batch.partition_key,
-        tags={**batch.tags(), PID_TAG: str(os.getpid())},
+        tags={**batch.tags(), **own_tags()},
         raise_on_error=False,
         run_config={"loggers": {"console": {"config": {"log_level": "CRITICAL"}}}},
     )
     if result.success:
         return []
     causes = [_cause(event.step_key or batch.job, error) for event in result.all_events for error in _errors(event)]
-    return list(dict.fromkeys(causes)) or [f"{batch.job}: the run failed and gave no reason; see it in 'odori ui'"]
+    causes = list(dict.fromkeys(causes)) or [f"{batch.job}: the run failed and gave no reason; see it in 'odori ui'"]
+    of = f"[{', '.join(batch.keys)}] " if any(batch.keys) else ""
+    return [f"{of}{cause}" for cause in causes]
 
 
 def _errors(event: dg.DagsterEvent) -> list[SerializableErrorInfo]:
@@ -191,9 +200,10 @@ def bring_up_to_date(
     sync_partitions(instance, state, studio)
     report = Report()
     tried: set[Batch] = set()
+    given_up: set[tuple[str, str]] = set()
     groups = tuple(groups)
     while True:
-        batches = [b for b in plan(state, instance, groups=groups, keys=keys) if b not in tried]
+        batches = plan(state, instance, groups=groups, keys=keys, tried=tried, given_up=given_up)
         if not batches:
             return report
         for batch in batches:
@@ -203,10 +213,45 @@ def bring_up_to_date(
             if failed and len(batch.keys) > 1:  # one partition's trouble must not stop its neighbours: one by one
                 for single in batch.singles():
                     tried.add(single)
-                    report.failed += execute(single, definitions, instance)
+                    failed = execute(single, definitions, instance)
+                    report.failed += failed
+                    given_up |= unmade(single, state) if failed else set()
             else:
                 report.failed += failed
+                given_up |= unmade(batch, state) if failed else set()
         state.forget()
+
+
+def unmade(batch: Batch, state: Freshness) -> set[tuple[str, str]]:
+    """Partitions a failed batch leaves as they were, and those of the same key that are made from them."""
+    assets = set(batch.assets)
+    for node in state.assets.values():  # inputs come first
+        if node.kind == state.assets[batch.assets[0]].kind and assets & set(node.inputs):
+            assets.add(node.name)
+    return {(asset, key) for asset in assets for key in batch.keys}
+
+
+def last_failures(instance: dg.DagsterInstance, *, newest: int = 200) -> dict[tuple[str, str], str]:
+    """Say why partitions failed whose latest run did: (asset, partition) to one sentence."""
+    found: dict[tuple[str, str], str] = {}
+    statuses = [dg.DagsterRunStatus.FAILURE, dg.DagsterRunStatus.SUCCESS]
+    for run in instance.get_runs(dg.RunsFilter(statuses=statuses), limit=newest):
+        keys = [lake_key(run.tags["dagster/partition"])] if "dagster/partition" in run.tags else [""]
+        if _RANGE_START in run.tags:  # a range that failed was run again one by one
+            continue
+        reason = ""
+        if run.status == dg.DagsterRunStatus.FAILURE:
+            causes = [
+                _cause(entry.dagster_event.step_key or "", error)
+                for entry in instance.all_logs(run.run_id, dg.DagsterEventType.STEP_FAILURE)
+                if entry.dagster_event
+                for error in _errors(entry.dagster_event)
+            ]
+            reason = causes[0] if causes else "the run ended without a reason; see it in 'odori ui'"
+        for asset in run.asset_selection or ():
+            for key in keys:
+                found.setdefault((asset.to_user_string(), key), reason)
+    return {pair: reason for pair, reason in found.items() if reason}
 
 
 @contextmanager
@@ -238,11 +283,49 @@ def clear_after_kill(studio: StudioFolder, instance: dg.DagsterInstance) -> int:
     Only to be called while the studio is held.
     """
     removed = studio.lake.sweep()
-    unfinished = dg.RunsFilter(statuses=[dg.DagsterRunStatus.STARTED, dg.DagsterRunStatus.STARTING])
-    for run in instance.get_runs(unfinished):
-        if PID_TAG in run.tags:
-            instance.report_run_failed(run, "its process was killed; the next build does its work again")
+    end_dead_runs(instance)
     return removed
+
+
+UNFINISHED = (
+    dg.DagsterRunStatus.QUEUED,
+    dg.DagsterRunStatus.NOT_STARTED,
+    dg.DagsterRunStatus.STARTING,
+    dg.DagsterRunStatus.STARTED,
+)
+
+
+def own_tags() -> dict[str, str]:
+    """Tags of a run that this process starts or asks for: by them it is known to be dead when the process is."""
+    return {PID_TAG: f"{os.getpid()} {_started(os.getpid())}"}
+
+
+def end_dead_runs(instance: dg.DagsterInstance, *, untagged: bool = False) -> None:
+    """Report runs as failed whose process is gone; with ``untagged`` also those that were started by hand in the UI."""
+    for run in instance.get_runs(dg.RunsFilter(statuses=list(UNFINISHED))):
+        pid, _, started = run.tags.get(PID_TAG, "").partition(" ")
+        if _started(int(pid)) != started if pid.isdigit() else untagged:
+            instance.report_run_failed(run, "its process was killed; the next build does its work again")
+
+
+def _started(pid: int) -> str:
+    """When a process started, in the kernel's ticks, so that a number used again is not taken for it; "" when gone."""
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text()
+    except FileNotFoundError:
+        if Path("/proc/self/stat").exists():
+            return ""
+    except OSError:
+        pass
+    else:
+        return text.rpartition(")")[2].split()[19]
+    try:  # no /proc here: whether it is alive must do
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return ""
+    except PermissionError:
+        pass
+    return "alive"
 
 
 # Odori prints nothing inside a run that its metadata and events do not say better: no log files beside each run.
@@ -268,6 +351,14 @@ def open_instance(studio: StudioFolder) -> dg.DagsterInstance:
     home = studio.dagster_home
     try:
         home.mkdir(parents=True, exist_ok=True)
+        owner = home / "odori-studio"
+        if not owner.exists():
+            owner.write_text(f"{studio.root}\n")
+        elif home != studio.root / ".dagster" and owner.read_text().strip() != str(studio.root):
+            raise StudioError(
+                f"{home}: want Dagster's storage of {studio.root}, got that of {owner.read_text().strip()}; "
+                "set DAGSTER_HOME to a folder of its own for each studio"
+            )
         configuration = home / "dagster.yaml"
         if not configuration.exists():
             configuration.write_text(_CONFIGURATION)

@@ -3,7 +3,7 @@
 import difflib
 import json
 import shutil
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,17 +11,18 @@ from typing import Any
 from sqlalchemy.exc import DBAPIError
 
 from assets.formats.errors import FormatError
-from assets.lineage import Progress
+from assets.lineage import Progress, content_version
 from assets.motion import beat_settings
 from assets.partitions import METHODS
 from assets.sources import Request, Song
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.freshness import Freshness
+from pipelines.freshness import Finding, Freshness
 from pipelines.lake import write_beside
 from pipelines.resources import StudioError, StudioFolder
 from pipelines.web import existing
+from schemas.motion import CANONICAL_POSE
 from schemas.music import SONG
 
 DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
@@ -271,16 +272,24 @@ def status(root: Path) -> Outcome:
     studio = existing(root)
     state = freshness(studio)
     clips, songs = _clips(state, studio), _songs(state, studio)
-    findings = state.findings()
-    assets = [
-        {"asset": f.asset, "partition": f.key, "group": state.assets[f.asset].group, "state": f.state, "why": f.why}
-        for f in findings
-    ]
+    failures = building.last_failures(building.open_instance(studio)) if studio.dagster_home.is_dir() else {}
+    assets = [_asset_facts(f, state, failures) for f in state.findings()]
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
     notes = list(state.sources.notes)
     facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes}
     report = _status_report(studio, clips, songs, assets, refused, notes)
     return Outcome(SOME_REFUSED if refused else DONE, facts, report)
+
+
+def _asset_facts(finding: Finding, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:
+    failure = failures.get((finding.asset, finding.key)) if finding.state in ("stale", "missing") else None
+    return {
+        "asset": finding.asset,
+        "partition": finding.key,
+        "group": state.assets[finding.asset].group,
+        "state": "failed" if failure else finding.state,
+        "why": failure or finding.why,
+    }
 
 
 def _status_report(
@@ -312,13 +321,25 @@ def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
     for session in studio.lake.keys("clip"):
         for row in studio.lake.table("clip", session).to_pylist():
             stored[row["path"]] = row
+    unplaced = {session: _unplaced(state, session) for session in studio.lake.keys("canonical_pose")}
     found = []
     for clip in state.sources.clips:
         path = clip.path.encode("utf-8", "backslashreplace").decode()
         row = stored.get(path)
         seen = _seen(row, clip.sha256, clip.problem)
+        if seen["state"] == "read" and clip.key in unplaced.get(clip.session, ()):
+            seen = {"state": "refused", "reason": "its motion could not be brought to the canonical skeleton"}
         found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
     return found
+
+
+def _unplaced(state: Freshness, session: str) -> set[str]:
+    """Clips of a session that were read and have no canonical pose."""
+    stamp = state.stamp("canonical_pose", session)
+    return {clip for clip, made in stamp.clips.items() if made.content == _NO_POSE} if stamp else set()
+
+
+_NO_POSE = content_version(CANONICAL_POSE.empty())
 
 
 def _songs(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:

@@ -19,18 +19,26 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
     overrides : resources by key, in place of the usual ones
     """
     folder = studio or studio_from_environment()
-    state = freshness(folder)
+    # Made for each run anew: a run keeps to the settings and sources it began with, and its stamps say so.
     resources: dict[str, Any] = {
-        "studio": folder,
+        "studio": dg.ResourceDefinition(lambda _: folder.frozen()),
         "earlier": EarlierTables(folder.lake),
         "progress": NoProgress(),
-        "pair_distance": dg.ResourceDefinition(lambda _: pair_distance(folder.settings().opencl)),
-        "lake": LakeIOManager(folder.lake, state),
-        "stage": StageIOManager(folder, state),
+        "pair_distance": dg.ResourceDefinition(
+            lambda context: pair_distance(context.resources.studio.settings().opencl), required_resource_keys={"studio"}
+        ),
+        "lake": dg.IOManagerDefinition(
+            lambda context: LakeIOManager(context.resources.studio.lake, freshness(context.resources.studio)),
+            required_resource_keys={"studio"},
+        ),
+        "stage": dg.IOManagerDefinition(
+            lambda context: StageIOManager(context.resources.studio, freshness(context.resources.studio)),
+            required_resource_keys={"studio"},
+        ),
     }
     return dg.Definitions(
         assets=ASSETS,
-        jobs=jobs.JOBS,
+        jobs=[*jobs.JOBS, schedules.rebuild_all],
         schedules=[schedules.nightly],
         sensors=[sensors.source_sensor],
         resources=resources | overrides,

@@ -6,7 +6,7 @@ sensor, the schedule and ``odori status`` all ask here.
 """
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -17,9 +17,11 @@ from assets import sources as source_kinds
 from assets.declare import SETTINGS_KEY, SOURCES_KEY
 from assets.lineage import Stamp, version_of
 from assets.partitions import METHODS
-from assets.sources import Sources, Studio
+from assets.sources import Sources
 from pipelines.lake import Lake
+from pipelines.resources import StudioError, StudioFolder
 
+STAGE_IO_MANAGER = "stage"
 Kind = Literal["session", "song", "dance", "whole"]
 State = Literal["fresh", "stale", "missing", "waiting"]
 
@@ -36,6 +38,7 @@ class Node:
     settings: tuple[str, ...]
     sources: str
     together: tuple[str, ...]
+    writes_stages: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,7 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
                 tuple(str(spec.metadata.get(SETTINGS_KEY, "")).split()),
                 str(spec.metadata.get(SOURCES_KEY, "")),
                 together,
+                definition.get_io_manager_key_for_asset_key(spec.key) == STAGE_IO_MANAGER,
             )
     ordered: dict[str, Node] = {}
     while len(ordered) < len(found):
@@ -88,7 +92,7 @@ class Freshness:
     lake, studio : where results and sources are
     """
 
-    def __init__(self, assets: Mapping[str, Node], lake: Lake, studio: Studio) -> None:
+    def __init__(self, assets: Mapping[str, Node], lake: Lake, studio: StudioFolder) -> None:
         self.assets = assets
         self._lake = lake
         self._studio = studio
@@ -96,8 +100,27 @@ class Freshness:
 
     @cached_property
     def sources(self) -> Sources:
-        """The sources as they were when first asked for."""
-        return self._studio.sources()
+        """The sources as they were when first asked for.
+
+        Raises
+        ------
+        StudioError
+            If all clips are gone that were there, or the folder of the songs is: a share that is not mounted must not
+            cost the catalogue.
+        """
+        found = self._studio.sources()
+        n_sessions, n_songs = len(self._lake.keys("clip")), len(self._lake.keys("song"))
+        if n_sessions and not found.clips:
+            raise StudioError(
+                f"{self._studio.root / 'clips'}: want the clips that were there ({n_sessions} sessions stored), got "
+                "none; bring them back (is the share mounted?), or delete the lake folder to start afresh"
+            )
+        if n_songs and not (self._studio.root / "songs").is_dir():
+            raise StudioError(
+                f"{self._studio.root / 'songs'}: want the folder of the songs ({n_songs} stored), got none; bring it "
+                "back (is the share mounted?), or make an empty one"
+            )
+        return found
 
     def forget(self) -> None:
         """Look at the lake anew."""
@@ -140,15 +163,26 @@ class Freshness:
         return ""
 
     def inputs(self, asset: str, key: str) -> dict[str, str] | None:
-        """Versions an asset's partition would be made from now; None while an input is not there."""
+        """Versions an asset's partition would be made from now; None while an input is not there.
+
+        What reads every session or song reads those that there are: one that cannot be made stops no other.
+        """
         node = self.assets[asset]
         versions = {}
         for name in node.inputs:
-            stamps = [(k, self.stamp(name, k)) for k in self._input_keys(node.kind, self.assets[name].kind, name, key)]
+            of = self.assets[name].kind
+            stamps = [(k, self.stamp(name, k)) for k in self._input_keys(node.kind, of, name, key)]
+            if self._reads_every(node.kind, of):
+                stamps = [(k, stamp) for k, stamp in stamps if stamp is not None]
             if any(stamp is None for _, stamp in stamps):
                 return None
             versions[name] = version_of(*(f"{k}:{stamp.content}" for k, stamp in stamps if stamp))
         return versions
+
+    @staticmethod
+    def _reads_every(kind: Kind, of: Kind) -> bool:
+        """Whether an asset of one kind reads all partitions of another, not its own."""
+        return of != "whole" and of != kind and not (kind == "dance" and of == "song")
 
     def _input_keys(self, kind: Kind, of: Kind, name: str, key: str) -> Sequence[str]:
         if of == "whole":
@@ -180,17 +214,26 @@ class Freshness:
         changed = sorted(name for name in expected if stamp.inputs.get(name) != expected[name])
         if changed:
             return Finding(asset, key, "stale", f"{', '.join(changed)} changed")
+        if node.writes_stages:
+            lost = self._studio.lost_stages(*key.split("|"))
+            if lost:
+                return Finding(asset, key, "stale", f"{', '.join(lost)} is not there any more")
         return Finding(asset, key, "fresh")
 
-    def findings(self, groups: Iterable[str] | None = None) -> list[Finding]:
-        """State of every partition of every asset, or of some groups, inputs first."""
+    def findings(
+        self, groups: Iterable[str] | None = None, *, given_up: Collection[tuple[str, str]] = ()
+    ) -> list[Finding]:
+        """State of every partition of every asset, or of some groups, inputs first.
+
+        ``given_up`` are partitions that could not be made: nothing waits for them.
+        """
         wanted = set(groups) if groups is not None else None
         found: list[Finding] = []
         pending: set[tuple[str, str]] = set()
         for node in self.assets.values():
             for key in self.keys(node.kind):
                 finding = self.state(node.name, key, pending=pending)
-                if finding.state != "fresh":
+                if finding.state != "fresh" and (node.name, key) not in given_up:
                     pending.add((node.name, key))
                 if wanted is None or node.group in wanted:
                     found.append(finding)

@@ -104,10 +104,10 @@ class LakeIOManager(dg.IOManager):
         """Load a table where the asset asks for one, else a handle on the stored partitions."""
         asset = context.asset_key.to_user_string()
         keys = [lake_key(k) for k in context.asset_partition_keys] if context.has_asset_partitions else [""]
-        stored = StoredTable(self._lake, asset, keys)
         if context.dagster_type.typing_type is pa.Table:
-            return stored.read(keys[0])
-        return stored
+            return StoredTable(self._lake, asset, keys).read(keys[0])
+        # Of all partitions those that there are: one that could not be made stops no other.
+        return StoredTable(self._lake, asset, [key for key in keys if self._lake.stamp(asset, key) is not None])
 
 
 def _parts(obj: pa.Table | Part | Parts, keys: Sequence[str]) -> Iterable[Part]:

@@ -6,6 +6,7 @@ The only place that reads the environment.
 import json
 import os
 from dataclasses import asdict
+from functools import cached_property
 from pathlib import Path
 
 from upath import UPath
@@ -34,6 +35,10 @@ class StudioFolder:
     def __init__(self, root: Path) -> None:
         self.root = root.absolute()
         self.lake = Lake(UPath(self.root / "lake"))
+
+    def frozen(self) -> "StudioFolder":
+        """Give the studio as one run sees it: what was read once stays so, whatever is edited meanwhile."""
+        return _FrozenStudio(self.root)
 
     def sources(self) -> Sources:
         """List what is there, hashed; files that did not change are not read again."""
@@ -68,6 +73,12 @@ class StudioFolder:
         text = json.dumps(asdict(request), sort_keys=True)
         write_beside(self.root / "lake" / "request" / f"{key}.json", lambda file: file.write(text.encode()))
 
+    def lost_stages(self, song: str, method: str) -> list[str]:
+        """Names of a finished dance's files that are not there any more."""
+        folder = self.dances / song
+        names = ("song.wav", f"{method}.usdc", f"{method}.usdz", f"{method}.json")
+        return [name for name in names if not (folder / name).is_file()]
+
     @property
     def dagster_home(self) -> Path:
         """Folder of Dagster's own storage: ``$DAGSTER_HOME``, else inside the studio."""
@@ -77,6 +88,31 @@ class StudioFolder:
     def dances(self) -> Path:
         """Folder of the finished stages."""
         return self.root / "dances"
+
+
+class _FrozenStudio(StudioFolder):
+    """A studio whose settings, sources and requests are read once."""
+
+    @cached_property
+    def _settings(self) -> Settings:
+        return super().settings()
+
+    @cached_property
+    def _sources(self) -> Sources:
+        return super().sources()
+
+    @cached_property
+    def _requests(self) -> dict[str, Request]:
+        return super().requests()
+
+    def settings(self) -> Settings:
+        return self._settings
+
+    def sources(self) -> Sources:
+        return self._sources
+
+    def requests(self) -> dict[str, Request]:
+        return self._requests
 
 
 def studio_from_environment() -> StudioFolder:

@@ -2,21 +2,38 @@
 
 import dagster as dg
 
-from pipelines import build, sensors
+from pipelines import build
 from pipelines.collection import freshness
-from pipelines.jobs import JOBS
 from pipelines.resources import StudioFolder
+
+
+@dg.op(description="Brings catalogue and dances up to date, stage by stage, as `odori build --dances` does.")
+def bring_up_to_date(context: dg.OpExecutionContext, studio: dg.ResourceParam[StudioFolder]) -> None:
+    """Run whatever is stale, each batch as an ordinary run of its own; fail when something could not be made."""
+    from pipelines.definitions import build_definitions  # it loads this module
+
+    with build.exclusive(studio):
+        build.clear_after_kill(studio, context.instance)
+        report = build.bring_up_to_date(
+            studio, build_definitions(studio), context.instance, freshness(studio), groups=build.GROUPS
+        )
+    context.add_output_metadata({"runs": len(report.ran), "failed": dg.MetadataValue.json(report.failed)})
+    if report.failed:
+        raise dg.Failure("; ".join(report.failed), allow_retries=False)
+
+
+@dg.job(description="Everything that is stale, catalogue and dances.")
+def rebuild_all() -> None:
+    """Bring a studio up to date in one go."""
+    bring_up_to_date()
 
 
 @dg.schedule(
     cron_schedule="0 3 * * *",
-    target=JOBS[0],
+    target=rebuild_all,
     default_status=dg.DefaultScheduleStatus.RUNNING,
-    description="Every night at three: whatever is stale, catalogue and dances, stage by stage with the sensor.",
+    description="Every night at three: whatever is stale, catalogue and dances.",
 )
-def nightly(
-    context: dg.ScheduleEvaluationContext, studio: dg.ResourceParam[StudioFolder]
-) -> list[dg.RunRequest] | dg.SkipReason:
-    """Ask for the first stale stage; the sensor goes on from there."""
-    found = sensors.requests(context.instance, studio, freshness(studio), groups=build.GROUPS)
-    return found or dg.SkipReason("everything is up to date")
+def nightly(context: dg.ScheduleEvaluationContext) -> dg.RunRequest:
+    """Ask for a rebuild of what is stale."""
+    return dg.RunRequest(tags=build.own_tags())

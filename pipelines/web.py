@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 from types import FrameType
 
-from pipelines.build import open_instance
+from pipelines.build import end_dead_runs, open_instance
 from pipelines.lake import why
 from pipelines.resources import StudioError, StudioFolder
 
@@ -19,7 +19,7 @@ from pipelines.resources import StudioError, StudioFolder
 def serve(root: Path, *, host: str, port: int) -> int:
     """Serve until interrupted or until one of the two ends; exit status."""
     studio = existing(root)
-    open_instance(studio)
+    end_dead_runs(open_instance(studio), untagged=True)
     environment = os.environ | {"ODORI_STUDIO": str(studio.root), "DAGSTER_HOME": str(studio.dagster_home.absolute())}
     module = ["-m", "pipelines.definitions"]
     commands = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,26 +49,32 @@ class File:
         return "." + self.name.rsplit(".", 1)[1].lower() if "." in self.name else ""
 
 
-def walk(root: Path) -> list[File]:
-    """List the files under a folder, following links but no loop, hidden names left out.
+def walk(root: Path, notes: list[str] | None = None) -> list[File]:
+    """List the files under a folder, following links but no loop; hidden names and what is no file are left out.
 
     Parameters
     ----------
     root : folder; a missing one lists nothing
+    notes : takes a sentence for each folder that cannot be listed
 
     Returns
     -------
     list of File
         Sorted by path.
     """
-    return sorted(_walk(root, "", frozenset()), key=lambda f: f.path)
+    return sorted(_walk(root, "", frozenset(), [] if notes is None else notes), key=lambda f: f.path)
 
 
-def _walk(folder: Path, prefix: str, seen: frozenset[tuple[int, int]]) -> Iterator[File]:
+def _walk(folder: Path, prefix: str, seen: frozenset[tuple[int, int]], notes: list[str]) -> Iterator[File]:
     try:
         here = folder.stat()
         entries = list(os.scandir(folder))
     except (FileNotFoundError, NotADirectoryError):
+        return
+    except OSError as error:
+        notes.append(
+            f"{folder.name}: cannot be listed: {error.strerror or error}; see to the folder and its permissions"
+        )
         return
     identity = (here.st_dev, here.st_ino)
     if identity in seen:
@@ -77,11 +84,12 @@ def _walk(folder: Path, prefix: str, seen: frozenset[tuple[int, int]]) -> Iterat
             continue
         try:
             if entry.is_dir():
-                yield from _walk(Path(entry.path), f"{prefix}{entry.name}/", seen | {identity})
+                yield from _walk(Path(entry.path), f"{prefix}{entry.name}/", seen | {identity}, notes)
             else:
-                stat = entry.stat()
-                yield File(f"{prefix}{entry.name}", stat.st_size, stat.st_mtime_ns)
-        except FileNotFoundError:  # a dangling link, or gone since it was listed
+                status = entry.stat()
+                if stat.S_ISREG(status.st_mode):
+                    yield File(f"{prefix}{entry.name}", status.st_size, status.st_mtime_ns)
+        except OSError:  # a dangling link, a link to itself, or gone since it was listed
             continue
 
 
