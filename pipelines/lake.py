@@ -79,7 +79,8 @@ class Lake:
         except FileNotFoundError as error:
             raise LakeError(f"{path.name}: the table {asset} is not built for it; run 'odori build'") from error
         except (ValueError, pa.ArrowInvalid, OSError) as error:  # OSError is also how damaged pages are reported
-            raise LakeError(f"{asset}/{path.name}: {error}; delete the file and run 'odori build'") from error
+            what = " ".join(str(error).split())
+            raise LakeError(f"{asset}/{path.name}: {what}; delete the file and run 'odori build'") from error
 
     def write(self, asset: str, key: str, table: pa.Table, stamp: Stamp) -> None:
         """Store a partition, rows of one clip in one row group.

@@ -1,11 +1,14 @@
 """Sensor and schedule: new, changed and removed files become partitions and runs, once."""
 
 import shutil
+import subprocess
+import sys
 
 import dagster as dg
 import pytest
 
 from pipelines import build as building
+from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
 from pipelines.resources import StudioFolder
 from pipelines.schedules import nightly
@@ -16,17 +19,13 @@ from pipelines.sensors import source_sensor
 def look():
     """Evaluate the sensor on a studio with its own instance: (instance, results)."""
 
-    def evaluate(root, evaluator=source_sensor):
+    def evaluate(root):
         folder = StudioFolder(root)
         instance = building.open_instance(folder)
-        if evaluator is source_sensor:
-            context = dg.build_sensor_context(
-                instance=instance, resources={"studio": folder}, definitions=build_definitions(folder)
-            )
-            return instance, list(source_sensor(context))
-        context = dg.build_schedule_context(instance=instance, resources={"studio": folder})
-        found = nightly(context)
-        return instance, found if isinstance(found, list) else [found]
+        context = dg.build_sensor_context(
+            instance=instance, resources={"studio": folder}, definitions=build_definitions(folder)
+        )
+        return instance, list(source_sensor(context))
 
     return evaluate
 
@@ -103,10 +102,53 @@ def test_sensor_waits_for_runs_that_are_going_on(studio, look):
     assert [type(r) for r in results] == [dg.SkipReason]
 
 
-def test_nightly_asks_for_the_same(studio, look):
-    _, results = look(studio, nightly)
-    assert [type(r) for r in results] == [dg.SkipReason]
+def test_nightly_brings_everything_up_to_date_in_one_run(studio):
     shutil.copytree(studio / "clips" / "kaede", studio / "clips" / "more")
-    _, results = look(studio, nightly)
-    assert [r.partition_key for r in requests(results)] == ["more"]
+    folder = StudioFolder(studio)
+    instance, definitions = building.open_instance(folder), build_definitions(folder)
+    request = nightly(dg.build_schedule_context(instance=instance))
     assert nightly.cron_schedule == "0 3 * * *"
+    job = definitions.resolve_job_def(nightly.job_name)
+    assert job.execute_in_process(instance=instance, tags=request.tags).success
+    state = freshness(folder)
+    assert {f.state for f in state.findings()} == {"fresh"}
+    assert "more" in state.keys("session")
+
+
+def test_what_comes_back_is_asked_for_again(studio, look):
+    """A, B and A again: the second A is another request than the first."""
+    clip = studio / "clips" / "ayame" / "step.bvh"
+    original = clip.read_bytes()
+    keys = []
+    for content in (original + b"\n", original, original + b"\n"):
+        clip.write_bytes(content)
+        _, results = look(studio)
+        keys.append(requests(results)[0].run_key)
+        instance = building.open_instance(StudioFolder(studio))
+        building.bring_up_to_date(
+            StudioFolder(studio), build_definitions(StudioFolder(studio)), instance, freshness(StudioFolder(studio))
+        )
+    assert len(set(keys)) == 3
+
+
+def test_a_killed_run_does_not_stop_the_sensor(studio, look):
+    shutil.copytree(studio / "clips" / "kaede", studio / "clips" / "more")
+    folder = StudioFolder(studio)
+    instance = building.open_instance(folder)
+    job = build_definitions(folder).resolve_job_def("rebuild_catalog")
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    tags = {building.PID_TAG: f"{gone.pid} 12345"}
+    dead = instance.create_run_for_job(job, status=dg.DagsterRunStatus.STARTED, tags=tags)
+    _, results = look(studio)
+    assert requests(results)
+    assert instance.get_run_by_id(dead.run_id).status == dg.DagsterRunStatus.FAILURE
+
+
+def test_a_share_that_is_not_mounted_costs_nothing(studio, look):
+    stored = sorted(p.name for p in (studio / "lake" / "clip").iterdir())
+    (studio / "clips").rename(studio / "elsewhere")
+    _, results = look(studio)
+    (skip,) = results
+    assert "want the clips that were there (2 sessions" in skip.skip_message
+    assert sorted(p.name for p in (studio / "lake" / "clip").iterdir()) == stored
