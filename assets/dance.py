@@ -83,7 +83,7 @@ def assembly(
 @table_asset(
     DANCE_QUALITY,
     group="dance",
-    code_version="1",
+    code_version="2",
     partitions=DANCE,
     ins={"canonical_pose": _EVERY_CLIP, "clip": _EVERY_CLIP},
     checks={

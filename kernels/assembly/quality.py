@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.assembly.blend import Dance, assemble, sample
 from kernels.assembly.feet import clip_contacts, planted_feet
@@ -18,6 +19,8 @@ from kernels.motion import contacts
 from kernels.motion.velocity import jerk, kinematic_beats
 from kernels.skeleton import grounding, kinematics
 from kernels.types import Choreography, Clip, Float, Skeleton
+
+Bool = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -303,11 +306,28 @@ def _longest_repeat(word: list[str]) -> int:
     return best
 
 
+def _danced_frames(dance: Dance, steps: Choreography, clip_id: str, clip: Clip) -> Bool:
+    """Mark the frames of a clip that a dance passes, (F,): all from one frame of the dance to the next.
+
+    Not only the nearest to each: a clip recorded faster than the stage would keep no two neighbours.
+    """
+    step = dance.lineage.step_index
+    phrase = np.cumsum(steps.has_seam)[step]
+    goes_on = (phrase[1:] == phrase[:-1]) & (np.array(steps.clip_id, object)[step[1:]] == clip_id)
+    before = np.flatnonzero(goes_on)
+    at = dance.lineage.clip_time_s * clip.frame_rate_hz
+    low, high = np.floor(at[before] + 1e-6), np.ceil(at[before + 1] - 1e-6) + 1
+    edge = np.zeros(clip.n_frames + 1, int)
+    np.add.at(edge, np.clip(low, 0, clip.n_frames).astype(int), 1)
+    np.add.at(edge, np.clip(high, 0, clip.n_frames).astype(int), -1)
+    return np.asarray(np.cumsum(edge)[:-1] > 0)
+
+
 def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
     """Judge the feet: slide while planted beyond the source clips' own, and depth below the floor.
 
     Which foot is planted when is taken from the source clips through the lineage: blending must not get to decide what
-    counts as contact. The source's own slide is that of the frames danced.
+    counts as contact. The source's own slide is that of every frame danced past, whatever the rate it was recorded at.
 
     Parameters
     ----------
@@ -324,10 +344,7 @@ def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) 
         clip = clips[clip_id]
         position, _ = kinematics.place(clip)
         found = clip_contacts(clip, position)
-        frame = np.flatnonzero([steps.clip_id[s] == clip_id for s in dance.lineage.step_index])
-        at = np.clip(np.round(dance.lineage.clip_time_s[frame] * clip.frame_rate_hz).astype(int), 0, clip.n_frames - 1)
-        used = np.zeros((clip.n_frames, 1), bool)
-        used[at] = True
+        used = _danced_frames(dance, steps, clip_id, clip)[:, None]
         danced = replace(found, ankle=found.ankle & used, toes=found.toes & used)
         stood_s = float(danced.foot.sum()) / clip.frame_rate_hz
         slide = contacts.foot_slide(
