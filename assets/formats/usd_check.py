@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,6 +22,8 @@ from pxr import Tf, Usd, UsdValidation
 from assets.formats import usd_contract, usd_read
 from assets.formats.errors import FormatError
 from assets.formats.usd_contract import Finding
+
+_NOT_LOADED = re.compile(r"\b(ModuleNotFoundError|ImportError|No module named)\b")
 
 
 def check(path: str | Path, *, time_limit_s: float = 60.0) -> list[Finding]:
@@ -36,9 +39,15 @@ def check(path: str | Path, *, time_limit_s: float = 60.0) -> list[Finding]:
     -------
     list of Finding
         Errors first; empty when all is well. A file that is missing, empty, damaged or no USD gives one finding.
+
+    Raises
+    ------
+    ChildProcessError
+        If that process could not load odori or USD: nothing was found out about the file.
     """
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(part for part in sys.path if part)}
-    command = [sys.executable, "-m", __name__, str(path)]
+    # -P: modules come from where ours came from, never from a folder of the same name where the user stands.
+    command = [sys.executable, "-P", "-m", __name__, str(path)]
     try:
         done = subprocess.run(command, capture_output=True, env=environment, timeout=time_limit_s, check=False)
     except subprocess.TimeoutExpired:
@@ -48,6 +57,9 @@ def check(path: str | Path, *, time_limit_s: float = 60.0) -> list[Finding]:
     try:
         return [Finding(**finding) for finding in json.loads(done.stdout)]
     except ValueError:
+        last = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        if done.returncode > 0 and _NOT_LOADED.search(last):
+            raise ChildProcessError(f"{path}: want it checked, got no validator: {last}; install odori again") from None
         return [Finding("error", "file", "", f"{path}: want a stage, got a file that crashes USD; it is damaged")]
 
 

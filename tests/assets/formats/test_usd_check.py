@@ -87,6 +87,20 @@ def test_a_file_that_crashes_usd_is_told(written, monkeypatch):
     assert "crashes USD" in finding.sentence
 
 
+@pytest.mark.parametrize("name", ["assets", "pxr", "json", "kernels"])
+def test_a_folder_with_modules_of_our_names_changes_nothing(written, tmp_path, monkeypatch, name):
+    (tmp_path / "here" / name).mkdir(parents=True)
+    (tmp_path / "here" / name / "__init__.py").write_text("raise SystemExit(3)")
+    monkeypatch.chdir(tmp_path / "here")
+    assert usd_check.check(written) == []
+
+
+def test_a_validator_that_does_not_load_is_no_fault_of_the_file(written, monkeypatch):
+    monkeypatch.setattr(usd_check, "__name__", "assets.formats.nowhere")
+    with pytest.raises(ChildProcessError, match="want it checked, got no validator: .*nowhere"):
+        usd_check.check(written)
+
+
 def test_a_file_that_hangs_usd_is_told(written):
     (finding,) = usd_check.check(written, time_limit_s=0.01)
     assert finding.rule == "file"
