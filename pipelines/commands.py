@@ -10,6 +10,7 @@ from typing import Any
 
 from sqlalchemy.exc import DBAPIError
 
+from assets.formats import usd_package
 from assets.formats.errors import FormatError
 from assets.lineage import Progress, content_version
 from assets.motion import beat_settings
@@ -141,8 +142,8 @@ def dance(
     studio = existing(root)
     if method not in METHODS:
         raise StudioError(f"--method: want one of {', '.join(METHODS)}, got {method!r}")
-    if out is not None and out.suffix not in (".usdz", ".usdc"):
-        raise StudioError(f"--out: want a file ending in .usdz or .usdc, got {out.name!r}")
+    if out is not None:
+        _check_out(out)
     work = _Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
     if out is not None and len(songs) > 1:
@@ -167,7 +168,7 @@ def dance(
         else:
             made.append(_dance_facts(studio, song.key, method))
     if out is not None and made:
-        _copy(studio, made[0], out)
+        _copy(made[0], out)
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
     facts = _dance_json(made, troubles, len(songs))
     return Outcome(status, facts, "\n".join(_dance_report(d) for d in made), list(dict.fromkeys(troubles)))
@@ -206,13 +207,27 @@ def _dance_report(facts: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _copy(studio: StudioFolder, facts: dict[str, Any], out: Path) -> None:
+def _check_out(out: Path) -> None:
+    """Refuse to copy to where a file of the user would be lost."""
+    if out.suffix not in (".usdz", ".usdc"):
+        raise StudioError(f"--out: want a file ending in .usdz or .usdc, got {out.name!r}")
+    sound = out.with_suffix(".wav")
+    if out.suffix == ".usdc" and sound.exists() and usd_package.song_name(out) != sound.name:
+        raise StudioError(
+            f"--out: want room for the song beside the stage, got another file {sound}; move it, or name another stage"
+        )
+
+
+def _copy(facts: dict[str, Any], out: Path) -> None:
     source = Path(facts["usdz" if out.suffix == ".usdz" else "stage"])
-    write_beside(out, lambda file: shutil.copyfileobj(source.open("rb"), file))
     facts["out"] = str(out)
-    if out.suffix == ".usdc":  # the stage names its song beside it
-        sound = source.with_name("song.wav")
-        write_beside(out.with_name(sound.name), lambda file: shutil.copyfileobj(sound.open("rb"), file))
+    if out.resolve() == source.resolve():
+        return
+    if out.suffix == ".usdc":
+        usd_package.copy_stage(out, source)
+    else:
+        with source.open("rb") as original:
+            write_beside(out, lambda file: shutil.copyfileobj(original, file))
 
 
 def _wanted(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[Song]:

@@ -58,6 +58,49 @@ def write_package(path: str | Path, stage: str | Path) -> None:
         _zip(partial, members)
 
 
+def copy_stage(path: str | Path, stage: str | Path) -> None:
+    """Copy a stage with the song it names; in the copy the song bears the copy's name, so that copies share a folder.
+
+    Parameters
+    ----------
+    path : ends in .usdc or .usda; folders are made
+    stage : path of a stage written by :func:`assets.formats.usd.write_stage`
+
+    Raises
+    ------
+    FormatError
+        If the stage cannot be read, or its song is missing or no WAV.
+    OSError
+        If a file cannot be written; what stood there before still stands.
+    """
+    path, stage = Path(path), Path(stage)
+    layer = _open_layer(stage)
+    song = layer.GetAttributeAtPath(contract.AUDIO_PATH + ".filePath")
+    if song is not None:
+        sound = path.with_suffix(contract.PACKAGE_AUDIO_SUFFIX)
+        data = _read_wave(stage.parent / song.default.path)
+        with usd.written_beside(sound) as partial:
+            partial.write_bytes(data)
+        song.default = Sdf.AssetPath("./" + sound.name)
+    with usd.written_beside(path) as partial:
+        usd.save(layer, partial)
+
+
+def song_name(stage: str | Path) -> str | None:
+    """Name of the song file a stage names; None where it names none, or is no stage.
+
+    Parameters
+    ----------
+    stage : path of any file
+    """
+    try:
+        layer = _open_layer(Path(stage))
+    except FormatError:
+        return None
+    song = layer.GetAttributeAtPath(contract.AUDIO_PATH + ".filePath")
+    return None if song is None else Path(song.default.path).name
+
+
 def _open_layer(path: Path) -> Sdf.Layer:
     """Open one layer apart from any other holder of the same file."""
     usd_read.open_stage(path)

@@ -1,5 +1,6 @@
 """What a person types and sees, and what a machine reads."""
 
+import gc
 import hashlib
 import itertools
 import json
@@ -11,10 +12,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from assets.formats import usd_read
+from assets.formats import usd_check, usd_package, usd_read
 from assets.tables import to_array
 from pipelines import commands
-from pipelines.resources import NoProgress
+from pipelines.resources import NoProgress, StudioError
 from schemas.catalog import TABLES
 
 
@@ -91,10 +92,36 @@ def test_frame_rate_and_copy(studio, tmp_path):
     assert out.read_bytes() == (studio / "dances" / "beat" / "graph.usdz").read_bytes()
     loose = tmp_path / "elsewhere" / "waltz.usdc"
     assert dance(studio, fps=60.0, out=loose).status == 0
-    assert (tmp_path / "elsewhere" / "song.wav").exists()
     assert usd_read.read_animation(loose).frame_rate_hz == 60.0
     assert dance(studio).status == 0
     assert usd_read.read_animation(studio / "dances" / "beat" / "graph.usdz").frame_rate_hz == 30.0
+
+
+def test_copies_share_a_folder_and_leave_what_is_the_users(studio, tmp_path):
+    mine = tmp_path / "song.wav"
+    mine.write_bytes(b"mine")
+    song = (studio / "dances" / "beat" / "song.wav").read_bytes()
+    for name in ("first", "second"):
+        assert dance(studio, out=tmp_path / f"{name}.usdc").status == 0
+        assert usd_check.check(tmp_path / f"{name}.usdc") == []
+        assert usd_package.song_name(tmp_path / f"{name}.usdc") == f"{name}.wav"
+        assert (tmp_path / f"{name}.wav").read_bytes() == song
+    assert mine.read_bytes() == b"mine"
+    assert dance(studio, out=tmp_path / "first.usdc").status == 0
+    with pytest.raises(StudioError, match="got another file .*song.wav; move it"):
+        dance(studio, out=tmp_path / "song.usdc")
+    assert sorted(p.name for p in tmp_path.iterdir() if p.is_file()) == [
+        *("first.usdc", "first.wav", "second.usdc", "second.wav", "song.wav"),
+    ]
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning", "error::ResourceWarning")
+def test_a_copy_leaves_no_file_open(studio, tmp_path):
+    for name in ("a.usdz", "b.usdc"):
+        commands._copy(
+            {"usdz": studio / "dances/beat/graph.usdz", "stage": studio / "dances/beat/graph.usdc"}, tmp_path / name
+        )
+    gc.collect()
 
 
 @pytest.mark.parametrize("name", ["beat", "beat.wav", "songs/beat.wav"])
