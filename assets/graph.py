@@ -18,7 +18,7 @@ from kernels.graph.distance import PairDistance
 from kernels.graph.features import BeatFeatures, beat_features, concatenate_beats
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
-from kernels.graph.transitions import Transitions, find_transitions
+from kernels.graph.transitions import Transitions, blend_margin_s, find_transitions
 from kernels.motion.velocity import accents
 from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float, MotionGraph
@@ -49,7 +49,7 @@ class Beats:
     "motion_graph",
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
-    code_version="1",
+    code_version="2",
     settings="motion_graph dance",
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
     checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
@@ -75,7 +75,7 @@ def motion_graph(
         distance=pair_distance,
         threshold=settings.threshold or None,
         n_nearest=settings.neighbours,
-        min_margin_s=studio.settings().dance.blend_s / 2,
+        min_margin_s=blend_margin_s(studio.settings().dance.blend_s),
     )
     graph = replace(found.graph, accent=np.concatenate([*(b.accent for b in beats), np.zeros(0)]))
     losses = {name: prune(graph) for name, prune in PRUNE.items()}

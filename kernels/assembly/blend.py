@@ -22,7 +22,7 @@ class Lineage:
     ----------
     step_index, blend_step_index : (F,) int64
         Step of the dominant clip and of its partner; -1 for no partner.
-    clip_time_s, blend_time_s : (F,) float64, seconds in the clips; NaN for no partner
+    clip_time_s, blend_time_s : (F,) float64, seconds in the clips, never beyond their ends; NaN for no partner
     blend_weight : (F,) float64, the partner's share, 0 to 0.5
     """
 
@@ -166,7 +166,10 @@ def assemble(
         span = np.flatnonzero(is_here & ((time_s < next_seam_s + after) | (b == len(half))))
         # One more sample at each seam: where this phrase takes over, and where it hands over.
         edges = np.array([motion.motion_s[a], motion.motion_s[b]])
-        clip_s = steps.clip_start_s[a] + np.append(motion_s[span], edges) - motion.motion_s[a]
+        # A blend that reaches past a clip's end is held at its last frame, and says so.
+        clip_s = np.clip(
+            steps.clip_start_s[a] + np.append(motion_s[span], edges) - motion.motion_s[a], 0.0, clip.duration_s
+        )
         xyz, q = sample(clip, clip_s)
         angle = heading - float(rotation.heading_rad(q[-2, 0]))
         xyz, q = turn(xyz, q, angle)

@@ -7,8 +7,8 @@ never depends on another, and the answer is the same on every backend. :func:`co
 the edges; it is cheap and looks at no pose.
 
 *Rule of the blend.* The blend of a transition i → j is centred on the beat: half of it needs frames of i's clip after
-i, half of it frames of j's clip before j. Both must be at least ``min_margin_s``. Only edges a dance can use are made:
-i must have a beat before it (it is danced to), j one after it (it is danced from).
+i, half of it frames of j's clip before j. Both must be at least ``min_margin_s``, in the clip's own time. Only edges a
+dance can use are made: i must have a beat before it (it is danced to), j one after it (it is danced from).
 
 *Rule of the jump.* No seam where a recording itself jerks by more than ``max_jerk_ratio`` times its clip's 99th
 percentile: a large d(i) there would make the ratio of equation 19 small with everything.
@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.graph.costs import PathCosts
 from kernels.graph.distance import (
     Metric,
     PairDistance,
@@ -38,9 +39,27 @@ from kernels.types import Float, Int, MotionGraph
 Mask = NDArray[np.bool_]
 _Pairs = tuple[Int, Int, Float, Float]
 
+
+def blend_margin_s(blend_s: float, *, costs: PathCosts | None = None) -> float:
+    """Clip time that half a blend needs, at the most a clip is usually sped up.
+
+    Parameters
+    ----------
+    blend_s : float, seconds of song, >= 0
+    costs : PathCosts, or None for the defaults
+        Its soft bounds are what is usual.
+
+    Returns
+    -------
+    float, seconds of a clip
+    """
+    costs = PathCosts() if costs is None else costs
+    return blend_s / 2 / costs.soft_ratio[0]
+
+
 N_NEAREST = 20
 GUARD_S = 0.5
-MIN_MARGIN_S = 0.2
+MIN_MARGIN_S = blend_margin_s(0.4)
 """Half of a blend of 0.4 s."""
 RAISE = 1.25
 

@@ -55,6 +55,21 @@ def test_seam_inside_one_continuous_clip_leaves_no_trace(clips, phrases):
     np.testing.assert_allclose(seamed.position_xyz_m, whole.position_xyz_m, atol=1e-6)
 
 
+def test_lineage_never_leaves_a_clip(clips, phrases):
+    # left 0.1 s before its end and entered 0.1 s after the other's start, with half a blend of 0.2 s
+    end_s = clips["step"].duration_s
+    steps = phrases(("step", end_s - 2.1, 4, 0.5, 0.4), ("wave", 0.1, 4, 0.5, 0.4), blend_s=0.4)
+    made = dance(steps, clips, rate_hz=60.0)
+    by_step = np.array([clips[clip].duration_s for clip in steps.clip_id])
+    line, both = made.lineage, made.lineage.blend_step_index >= 0
+    assert (line.clip_time_s >= 0).all()
+    assert (line.clip_time_s <= by_step[line.step_index]).all()
+    assert (line.blend_time_s[both] >= 0).all()
+    assert (line.blend_time_s[both] <= by_step[line.blend_step_index[both]]).all()
+    assert line.blend_time_s[both].min() == 0
+    assert line.blend_time_s[both].max() == end_s
+
+
 def test_halfway_on_the_seam(clips, phrases):
     steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("wave", 0.75, 6, 0.5, 0.5))
     made = dance(steps, clips)

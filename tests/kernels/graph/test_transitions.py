@@ -2,10 +2,19 @@ import numpy as np
 import pytest
 
 from kernels.graph import transitions
+from kernels.graph.costs import PathCosts
 from kernels.graph.distance import PoseFeatures, pose_distance
 from kernels.graph.features import BeatFeatures
 from kernels.graph.nodes import beat_nodes
-from kernels.graph.transitions import LOCAL_BOUNDS, RAISE, THRESHOLDS, connect, find_transitions, nearest
+from kernels.graph.transitions import (
+    LOCAL_BOUNDS,
+    RAISE,
+    THRESHOLDS,
+    blend_margin_s,
+    connect,
+    find_transitions,
+    nearest,
+)
 
 
 @pytest.fixture
@@ -123,6 +132,16 @@ def test_rule_of_the_blend(on_a_line):
     assert removed
     assert with_margin.n_margin_removed == len(removed)
     assert without.n_margin_removed == 0
+
+
+def test_a_blend_needs_frames_at_the_fastest_usual_pace(on_a_line):
+    assert blend_margin_s(0.4) == pytest.approx(0.2 / 0.9)
+    assert blend_margin_s(0.4, costs=PathCosts(soft_ratio=(0.85, 1.1))) == pytest.approx(0.2 / 0.85)
+    assert blend_margin_s(0.0) == 0
+    # 0.21 s are enough at the clip's own pace, not a tenth faster
+    features, nodes = on_a_line([[0, 1, 0, 1], [0, 1, 0, 1]], lead_s=0.21)
+    assert (2, 4) in edges(find_transitions(features, nodes, min_margin_s=0.2, threshold=3))
+    assert (2, 4) not in edges(find_transitions(features, nodes, threshold=3))
 
 
 def test_rule_of_the_jump(on_a_line):
