@@ -416,7 +416,7 @@ def from_frame_lineage(song_id: str, method: str, dance: Dance, steps: Choreogra
 
 
 def to_dance(pose: pa.Table, lineage: pa.Table, steps: Choreography) -> Dance:
-    """Unpack a dance; the steps of its lineage are found again by song time."""
+    """Unpack a dance; the steps of its lineage, and of the partners at its seams, are found again by song time."""
     time_s = to_numbers(pose["time_s"])
     step = np.clip(np.searchsorted(steps.song_start_s, time_s + 1e-9, side="right") - 1, 0, len(steps.clip_id) - 1)
     blend_time_s = lineage["blend_time_s"].to_numpy()
@@ -428,11 +428,21 @@ def to_dance(pose: pa.Table, lineage: pa.Table, steps: Choreography) -> Dance:
         Lineage(
             step,
             to_numbers(lineage["clip_time_s"]),
-            np.where(np.isnan(blend_time_s), -1, step),
+            np.where(np.isnan(blend_time_s), -1, _partner(steps, time_s)),
             blend_time_s,
             to_numbers(lineage["blend_weight_ratio"]).astype(np.float64),
         ),
     )
+
+
+def _partner(steps: Choreography, time_s: Float) -> Int:
+    """Find the step blended with at each moment: across the nearest seam; -1 without seams."""
+    seam = np.flatnonzero(steps.has_seam)
+    if not len(seam):
+        return np.full(len(time_s), -1)
+    at_s = steps.song_start_s[seam]
+    nearest = np.searchsorted((at_s[1:] + at_s[:-1]) / 2, time_s)
+    return np.where(time_s + 1e-9 >= at_s[nearest], seam[nearest] - 1, seam[nearest])
 
 
 def from_dance_quality(song_id: str, method: str, measures: Iterable[Measure]) -> pa.Table:

@@ -168,3 +168,19 @@ def test_dance_and_lineage_round_trip():
     again = tables.to_dance(pose, line, back)
     np.testing.assert_allclose(again.position_xyz_m, dance.position_xyz_m, atol=1e-6)
     np.testing.assert_array_equal(again.lineage.step_index, dance.lineage.step_index)
+    np.testing.assert_array_equal(again.lineage.blend_step_index, dance.lineage.blend_step_index)
+
+
+def test_partners_are_found_again_in_blends_wider_than_a_step():
+    length = np.array([0.5, 0.2, 0.2, 0.2, 0.2, 0.3, 0.5])
+    end = np.cumsum(length)
+    seam = np.array([False, False, True, False, False, True, False])
+    ids = ("a", "a", "b", "b", "b", "a", "a")
+    start = 1.0 + end - length
+    steps = Choreography(ids, end - length, end, start, start + length, seam, np.where(seam, 0.6, 0.0))
+    clips = {"a": take("step").clip, "b": take("wave").clip}
+    dance = assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=float(end[-1]))
+    pose, line = tables.from_dance_pose("x", "graph", dance), tables.from_frame_lineage("x", "graph", dance, steps)
+    again = tables.to_dance(pose, line, steps)
+    assert set(dance.lineage.blend_step_index) == {-1, 1, 2, 4, 5}
+    np.testing.assert_array_equal(again.lineage.blend_step_index, dance.lineage.blend_step_index)

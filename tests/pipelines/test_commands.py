@@ -108,7 +108,7 @@ def test_copies_share_a_folder_and_leave_what_is_the_users(studio, tmp_path):
         assert (tmp_path / f"{name}.wav").read_bytes() == song
     assert mine.read_bytes() == b"mine"
     assert dance(studio, out=tmp_path / "first.usdc").status == 0
-    with pytest.raises(StudioError, match="got another file .*song.wav; move it"):
+    with pytest.raises(StudioError, match=r"got another file .*song\.wav; move it"):
         dance(studio, out=tmp_path / "song.usdc")
     assert sorted(p.name for p in tmp_path.iterdir() if p.is_file()) == [
         *("first.usdc", "first.wav", "second.usdc", "second.wav", "song.wav"),

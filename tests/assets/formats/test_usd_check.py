@@ -97,7 +97,7 @@ def test_a_folder_with_modules_of_our_names_changes_nothing(written, tmp_path, m
 
 def test_a_validator_that_does_not_load_is_no_fault_of_the_file(written, monkeypatch):
     monkeypatch.setattr(usd_check, "__name__", "assets.formats.nowhere")
-    with pytest.raises(ChildProcessError, match="want it checked, got no validator: .*nowhere"):
+    with pytest.raises(ChildProcessError, match=r"want it checked, got no validator: .*nowhere"):
         usd_check.check(written)
 
 
