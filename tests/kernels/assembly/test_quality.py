@@ -112,14 +112,33 @@ def test_warp_counts_steps_in_and_out_of_bounds(phrases):
 
 def test_seam_in_one_continuous_clip_is_as_smooth_as_the_clip(phrases, dance, clips):
     steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("step", 3.25, 6, 0.5, 0.5))
-    found = values(quality.seam_measures(dance(steps), steps, clips, skeleton=CANONICAL))
-    assert found["seam_jerk_ratio"] < 1.05
+    found = quality.seam_measures(dance(steps), steps, clips, skeleton=CANONICAL)
+    assert values(found)["seam_jerk_ratio"] < 1.05
+    assert passed(found)["seam_jerk_ratio"]
 
 
 def test_plain_cut_is_worse_than_a_blend(phrases, dance, clips):
     steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("wave", 0.75, 6, 0.5, 0.5), blend_s=0.4)
     found = values(quality.seam_measures(dance(steps), steps, clips, skeleton=CANONICAL))
     assert found["seam_jerk_plain_cut_ratio"] > 3 * found["seam_jerk_ratio"]
+
+
+def test_one_rough_seam_is_not_hidden_by_smooth_ones(phrases, dance, clips):
+    going_on = [("step", 0.25 + 2 * i, 4, 0.5, 0.5) for i in range(3)]
+    steps = phrases(*going_on, ("wave", 0.75, 4, 0.5, 0.5), blend_s=0.05)
+    found = quality.seam_measures(dance(steps), steps, clips, skeleton=CANONICAL)
+    assert values(found)["seam_jerk_median_ratio"] < 1.05
+    assert values(found)["seam_jerk_ratio"] == values(found)["seam_jerk_worst_ratio"] > 1.5
+    assert not passed(found)["seam_jerk_ratio"]
+
+
+def test_one_rough_seam_in_many_is_told_and_passes(phrases, dance, clips):
+    going_on = [("step", 0.25 + 0.25 * i, 1, 0.25, 0.25) for i in range(29)]
+    steps = phrases(*going_on, ("wave", 0.75, 4, 0.5, 0.5), blend_s=0.05)
+    found = values(quality.seam_measures(dance(steps), steps, clips, skeleton=CANONICAL))
+    assert found["seam_count"] == 29
+    assert found["seam_jerk_worst_ratio"] > 1.5
+    assert found["seam_jerk_ratio"] < found["seam_jerk_worst_ratio"]
 
 
 def test_no_seam_is_no_trouble(phrases, dance, clips):
@@ -132,9 +151,22 @@ def test_no_seam_is_no_trouble(phrases, dance, clips):
 def test_catalogue_use_and_repetition(phrases):
     steps = phrases(("a", 0.0, 3, 0.5, 0.5), ("b", 1.0, 2, 0.5, 0.5), ("a", 0.0, 3, 0.5, 0.5))
     found = values(quality.catalogue_measures(steps, {"a": 4.0, "b": 4.0, "c": 8.0}))
-    assert found == {"clip_count": 2.0, "coverage_ratio": 0.5, "longest_repeat_steps": 3.0}
+    assert found == {"clip_count": 2.0, "coverage_ratio": pytest.approx(2.5 / 16), "longest_repeat_steps": 3.0}
     once = values(quality.catalogue_measures(phrases(("a", 0.0, 5, 0.5, 0.5)), {"a": 4.0}))
     assert once["longest_repeat_steps"] == 0
+
+
+def test_coverage_counts_a_stretch_once_and_no_more_than_the_catalogue_has(phrases):
+    def coverage(*parts, **catalogue_s):
+        return values(quality.catalogue_measures(phrases(*parts), catalogue_s))["coverage_ratio"]
+
+    once = ("a", 1.0, 4, 0.5, 0.5)
+    assert coverage(once, a=8.0) == pytest.approx(0.25)
+    assert coverage(once, ("a", 2.0, 4, 0.5, 0.5), once, a=8.0) == pytest.approx(3 / 8)
+    assert coverage(("a", 4.0, 2, 0.5, 0.5), ("a", 0.0, 2, 0.5, 0.5), a=8.0, b=8.0) == pytest.approx(2 / 16)
+    assert coverage(("a", 0.0, 4, 0.5, 0.5), a=1.5) == 1.0
+    assert coverage(once, b=4.0) == 0
+    assert coverage(once) == 0
 
 
 def test_repeat_of_a_loop_does_not_overlap_itself(phrases):
