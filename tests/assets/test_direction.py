@@ -1,0 +1,100 @@
+"""Pins on the beats of a song and the nodes of a graph."""
+
+import numpy as np
+import pytest
+
+from assets.direction import DirectionError, Nodes, Song, kept, sentences, to_pin, way_out
+from kernels.graph.pins import Conflict, WayOut
+from kernels.types import BeatGrid
+from schemas.pins import parse_pin
+
+
+@pytest.fixture
+def song():
+    """Beats every half second from 0.5 to 8 s, a pick-up of one beat and bars of four; the dance begins at 0."""
+    time_s = np.arange(1, 17) * 0.5
+    number = np.arange(16)
+    beats = BeatGrid(
+        time_s=time_s, bar_number=(number + 3) // 4 + 1, beat_in_bar_number=(number + 3) % 4 + 1, confidence=np.ones(16)
+    )
+    return Song(np.arange(18) * 0.5, beats, 8.3)
+
+
+@pytest.fixture
+def nodes():
+    return Nodes(
+        np.array(["a", "a", "b", "c"]), np.array(["spin", "spin", "walk", "spin"]), np.array(["", "", "hip", "x"])
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "last"),
+    [
+        ("0=spin", 0, 1),
+        ("0.5=spin", 1, 2),
+        ("0.49=spin", 0, 1),
+        ("1-2=spin", 2, 4),
+        ("1.2-2.1=spin", 2, 5),
+        ("8.3=spin", 16, 17),
+        ("beat:1=spin", 1, 2),
+        ("beat:3-5=spin", 3, 5),
+        ("beat:16=spin", 16, 17),
+        ("bar:1=spin", 1, 2),
+        ("bar:2=spin", 2, 6),
+        ("bar:2-3=spin", 2, 10),
+        ("bar:5=spin", 14, 17),
+        ("start=spin", 0, 1),
+        ("end=spin", 16, 17),
+    ],
+)
+def test_places(song, nodes, text, first, last):
+    pin = to_pin(parse_pin(text), song, nodes)
+    assert (pin.first, pin.last) == (first, last)
+    assert pin.name == text
+
+
+@pytest.mark.parametrize(
+    ("wish", "admitted"),
+    [
+        ("spin", [1, 1, 0, 1]),
+        ("not:spin", [0, 0, 1, 0]),
+        ("clip:b", [0, 0, 1, 0]),
+        ("style:x", [0, 0, 0, 1]),
+        ("jump", [0] * 4),
+    ],
+)
+def test_wishes(song, nodes, wish, admitted):
+    np.testing.assert_array_equal(to_pin(parse_pin(f"1={wish}"), song, nodes).nodes, np.array(admitted, bool))
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("9=spin", "0 to 8.30, got 9"),
+        ("beat:17=spin", "beat 1 to 16 of the song, got 17"),
+        ("bar:5-6=spin", "bar 1 to 5"),
+    ],
+)
+def test_places_that_are_not_there(song, nodes, text, word):
+    with pytest.raises(DirectionError, match=word):
+        to_pin(parse_pin(text), song, nodes)
+
+
+def test_bars_that_are_not_known(song, nodes):
+    none = np.zeros(16, int)
+    plain = Song(song.grid_s, BeatGrid(song.beats.time_s, none, none, np.ones(16)), 8.3)
+    with pytest.raises(DirectionError, match="pin seconds or beats"):
+        to_pin(parse_pin("bar:1=spin"), plain, nodes)
+
+
+def test_reports(song, nodes):
+    wishes = [parse_pin("2=spni"), parse_pin("3-4=walk")]
+    pins = [to_pin(w, song, nodes) for w in wishes]
+    told = sentences(Conflict((0,), "nothing", (WayOut(0, 0, "spin"),)), pins, wishes, song, nodes)
+    assert told == [
+        "2=spni: no clip with beats is labelled 'spni'; there are spin",
+        "would do: 2=spin in place of 2=spni",
+    ]
+    assert way_out(WayOut(1, -2, ""), pins, wishes, song) == "2.00-3.00=walk, 2 beats earlier than 3-4=walk"
+    assert "keeps them all" in sentences(Conflict((0, 1), "path", ()), pins, wishes, song, nodes)[0]
+    assert kept(pins[1:], song, {6: "b", 7: "b"}) == [{"pin": "3-4=walk", "from_s": 3.0, "to_s": 4.0, "clips": ["b"]}]
