@@ -290,3 +290,46 @@ def merge_matches(shards: Sequence[Sequence[Sequence[Match]]], *, k: int) -> lis
     if len({len(shard) for shard in shards}) > 1:
         raise ValueError(f"shards: want one number of segments, got {sorted({len(shard) for shard in shards})}")
     return [ranked((m for part in parts for m in part), k=k) for parts in zip(*shards, strict=True)]
+
+
+def sums_of_candidates(
+    segments: NDArray[np.float64],
+    frames: NDArray[np.float64],
+    *,
+    n_frames: NDArray[np.int64],
+    segment: NDArray[np.int64],
+    first: NDArray[np.int64],
+    numerator: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Score candidates of many segments and clips as :func:`sums` does, to the bit.
+
+    Parameters
+    ----------
+    segments : (S, L) float64
+        Filled up with zeros behind each segment.
+    frames : (T,) float64
+        Clips one after another.
+    n_frames : (S,) int64, frames of each segment
+    segment, first, numerator : (N,) int64
+        Of each candidate: its segment, the frame in `frames` under the segment's first, its scale times 50.
+
+    Returns
+    -------
+    score, motion_sum : (N,) float64
+    """
+    score = np.zeros(len(segment))
+    motion_sum = np.zeros(len(segment))
+    length = n_frames[segment]
+    last = len(frames) - 1
+    columns = np.ascontiguousarray(segments.T)
+    for f in range(int(length.max(initial=0))):
+        whole, rest = np.divmod(numerator * f, SCALE_DENOMINATOR)
+        at = first + whole
+        inside = f < length
+        weight = rest / SCALE_DENOMINATOR
+        b = (1.0 - weight) * frames[np.minimum(at, last)] + weight * frames[np.minimum(at + 1, last)]
+        value = columns[f][segment]
+        total = value + b
+        np.add(motion_sum, b, out=motion_sum, where=inside)
+        np.add(score, (value * b) / np.where(total > 0, total, 1.0), out=score, where=inside & (value > 0))
+    return score, motion_sum
