@@ -16,13 +16,17 @@ from kernels.matching import connect, intensity, path
 from kernels.matching.pieces import longest_first, motion_under, snap_start, split_span
 from kernels.matching.score import SCALE_DENOMINATOR
 from kernels.motion.features import FEATURE_RATE_HZ, at_feature_rate, link_directions, link_weights
+from kernels.motion.velocity import usable_frames
 from kernels.music.segments import Segments
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Choreography, Float
 from schemas.settings import MatchPathSettings, Settings
 
 EASY_WARP = (0.90, 1.10)
-WARP_COST, UNEASY_COST, MARGIN_COST = 0.1, 0.5, 0.5
+APART_S = 0.1
+"""How far apart moments of one clip are that pass for neighbours: a quarter of the usual blend."""
+
+WARP_COST, UNEASY_COST, MARGIN_COST = 0.1, 3.0, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,8 +310,8 @@ def joints_of(
         for j, piece in enumerate(ps):
             of_clip.setdefault(piece.clip_id, []).append((i, j))
     changes = []
-    for clip_id, direction in _directions(canonical_pose, set(of_clip)):
-        changes.append(connect.own_changes(direction, weight, apart_s=max(half_s, 1.0 / FEATURE_RATE_HZ)))
+    for clip_id, direction, (first_s, last_s) in _directions(canonical_pose, set(of_clip)):
+        changes.append(connect.own_changes(direction, weight, apart_s=APART_S))
         here = of_clip[clip_id]
         own = [pieces[i][j] for i, j in here]
         pace = np.array(
@@ -320,8 +324,8 @@ def joints_of(
             ends[i].direction[j], ends[i].velocity[j] = at_end.direction[n], at_end.velocity[n]
             room = half_s * pace[n]
             if room > 0:
-                lacking_start[i][j] = max(room - own[n].start_s, 0.0) / room
-                lacking_end[i][j] = max(room - (clips[clip_id].duration_s - own[n].end_s), 0.0) / room
+                lacking_start[i][j] = max(first_s + room - own[n].start_s, 0.0) / room
+                lacking_end[i][j] = max(own[n].end_s + room - last_s, 0.0) / room
     limits = connect.calibrate(changes)
     joints = []
     for i in range(len(pieces) - 1):
@@ -339,12 +343,14 @@ def _no_poses(n: int, n_links: int) -> connect.JointPoses:
     return connect.JointPoses(np.zeros((n, n_links, 3)), np.zeros((n, n_links, 3)))
 
 
-def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str, Float]]:
-    """Link directions of the wanted clips at 120 Hz, one clip at a time."""
+def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str, Float, tuple[float, float]]]:
+    """Link directions of the wanted clips at 120 Hz, one clip at a time, and the seconds between which it is usable."""
     for key in canonical_pose.keys:
         here = wanted & set(canonical_pose.stamp(key).clips)
         rows: pa.Table | None = canonical_pose.read(key, clip_ids=here) if here else None
         for moved in tables.to_canonical_poses(rows) if rows is not None else ():
             position = at_feature_rate(moved.position_xyz_m, moved.frame_rate_hz)
             root = at_feature_rate(moved.rotation_wxyz[:, 0], moved.frame_rate_hz)
-            yield moved.clip_id, link_directions(position, root, CANONICAL.parent)
+            first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
+            usable_s = first / moved.frame_rate_hz, last / moved.frame_rate_hz
+            yield moved.clip_id, link_directions(position, root, CANONICAL.parent), usable_s

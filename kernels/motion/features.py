@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from kernels import rotation
 from kernels.motion.beats import check_position
+from kernels.motion.velocity import usable_frames
 from kernels.types import Float, Int
 
 FEATURE_RATE_HZ = 120.0
@@ -29,8 +30,9 @@ FEATURE_RATE_HZ = 120.0
 SMOOTHING_S = 0.04
 """Standard deviation of the Gaussian over weight effort: what is faster is marker noise."""
 
-LEAST_DROP_RATIO, LEAST_DROP_RAD_PER_S = 0.08, 0.05
-"""A minimum is a stop where effort drops by so much of the clip's 99th percentile, and by so much at all."""
+LEAST_DROP_RATIO, LEAST_DROP_RAD_PER_S = 0.08, 0.2
+"""A minimum is a stop where effort drops by so much of the clip's 99th percentile, and by so much at all: a tenth of
+what a dance moves with, less is not seen."""
 
 LEAST_EFFORT_RAD_PER_S = 0.02
 """A clip whose 99th percentile is lower stands still: its rhythm and intensity are 0, not its noise blown up."""
@@ -248,7 +250,8 @@ def motion_features(
     -------
     MotionFeatures
         Of floor((F - 1) / rate * 120) + 1 values; of one where F is 1, none where it is 0. All 0 where the body stands
-        still.
+        still, and at a clip's ends in the frames no body moves to (a T-pose before the take,
+        :func:`kernels.motion.velocity.usable_frames`).
 
     Raises
     ------
@@ -259,6 +262,18 @@ def motion_features(
     if len(position_xyz_m) == 0:
         none = np.zeros(0)
         return MotionFeatures(none, none, none, none)
+    n = len(at_feature_rate(position_xyz_m[:, 0, 0], frame_rate_hz))
+    first, last = usable_frames(position_xyz_m, frame_rate_hz)
+    if (first, last) != (0, len(position_xyz_m) - 1):
+        inner = motion_features(
+            position_xyz_m[first : last + 1],
+            root_wxyz[first : last + 1],
+            parent=parent,
+            offset_xyz_m=offset_xyz_m,
+            frame_rate_hz=frame_rate_hz,
+            width_s=width_s,
+        )
+        return _inside(inner, n, round(first / frame_rate_hz * FEATURE_RATE_HZ))
     position = at_feature_rate(position_xyz_m, frame_rate_hz)
     root = rotation.normalize(at_feature_rate(rotation.continuous(root_wxyz), frame_rate_hz))
     effort = weight_effort(link_directions(position, root, parent), link_weights(offset_xyz_m, parent))
@@ -271,6 +286,16 @@ def motion_features(
     rhythm = bumps(len(effort), frame.astype(np.float64), drop, width_s=width_s)
     peak = between(effort, frame)
     return MotionFeatures(robust_unit(rhythm), robust_unit(peak), effort, peak)
+
+
+def _inside(found: MotionFeatures, n: int, first: int) -> MotionFeatures:
+    """Features of ``n`` values, 0 but where those found lie."""
+    columns = []
+    for values in (found.rhythm, found.intensity, found.effort_rad_per_s, found.peak_effort_rad_per_s):
+        out = np.zeros(n)
+        out[first : first + len(values)] = values[: max(n - first, 0)]
+        columns.append(out)
+    return MotionFeatures(*columns)
 
 
 def between(values: Float, frame: Int) -> Float:
