@@ -43,9 +43,12 @@ class MusicFeatures:
 
 
 def onset_strength(samples: Samples, sample_rate_hz: float) -> Float:
-    """Sum the rises of all bands, (F,) float64, >= 0, at 100 Hz; see :func:`kernels.music.onsets.flux`."""
+    """Sum the rises of all bands, (F,) float64, >= 0, at 100 Hz; see :func:`kernels.music.onsets.flux`.
+
+    Before the first sample there was silence: a song that starts with a sound has an onset there.
+    """
     level, _ = band_levels(samples, sample_rate_hz)
-    return np.asarray(flux(level).sum(axis=1), np.float64)
+    return np.asarray(flux(np.pad(level, ((2, 0), (0, 0))))[2:].sum(axis=1), np.float64)
 
 
 def gather(onset: Float, beat_s: Float, *, rate_hz: float = FRAME_RATE_HZ, reach_s: float = GATHER_S) -> Float:
