@@ -27,7 +27,7 @@ def swinging(n_frames, rate_hz, *, swing_hz=1.0, size_rad=0.5):
     """Hips, chest above them, and an arm that swings in the plane of the body: turns twice a cycle."""
     angle = size_rad * np.sin(2 * np.pi * swing_hz * np.arange(n_frames) / rate_hz)
     hips = np.tile([0.0, 1, 0], (n_frames, 1))
-    chest = hips + [0, 0.5, 0]
+    chest = hips + np.array([0, 0.5, 0])
     hand = chest + 0.5 * np.stack([np.cos(angle), np.sin(angle), np.zeros(n_frames)], axis=1)
     return np.stack([hips, chest, hand], axis=1), np.tile(rotation.IDENTITY, (n_frames, 1))
 
@@ -38,7 +38,7 @@ def features(position, root, rate_hz, **how):
 
 def test_effort_of_a_turning_link_is_its_speed_by_its_share_of_length():
     turn = np.arange(50) * 0.01
-    direction = np.stack([np.zeros((50, 3)) + [0, 1, 0], np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1)], axis=1)
+    direction = np.stack([np.tile([0.0, 1, 0], (50, 1)), np.stack([np.cos(turn), np.sin(turn), 0 * turn], 1)], axis=1)
     effort = weight_effort(direction, np.array([0.25, 0.75]))
     np.testing.assert_allclose(effort, 0.75 * 0.01 * FEATURE_RATE_HZ, rtol=1e-9)
 
@@ -80,7 +80,7 @@ def test_where_the_dancer_stands_and_faces_does_not_matter():
     position = place(made)
     root = made.clip.rotation_wxyz[:, 0]
     turn = rotation.from_heading(1.1)
-    moved = rotation.apply(turn, position) + [3.0, 0, -2]
+    moved = rotation.apply(turn, position) + np.array([3.0, 0, -2])
     how = {"parent": CANONICAL.parent, "offset_xyz_m": CANONICAL.offset_xyz_m, "frame_rate_hz": made.clip.frame_rate_hz}
     a = motion_features(position, root, **how)
     b = motion_features(moved, rotation.mul(turn, root), **how)
@@ -111,7 +111,7 @@ def test_shortest_clips(n_frames):
 
 def test_a_pose_before_the_take_is_no_stop_and_no_drive():
     position, root = swinging(361, 120.0)
-    position = np.concatenate([position[:1] + [5.0, 0, 0], position])
+    position = np.concatenate([position[:1] + np.array([5.0, 0, 0]), position])
     found = features(position, np.concatenate([root[:1], root]), 120.0)
     clean = features(*swinging(361, 120.0), 120.0)
     assert found.rhythm[0] == found.intensity[0] == 0

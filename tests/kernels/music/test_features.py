@@ -56,7 +56,7 @@ def test_beats_in_silence_have_no_rhythm(song):
     quiet[int(2.9 * RATE_HZ) :] = 0
     found = music_features(quiet, RATE_HZ, beat_s=beat_s, duration_s=len(quiet) / RATE_HZ)
     assert not found.rhythm[int(3.3 * 120) :].any()
-    assert found.rhythm[: int(2 * 120)].any()
+    assert found.rhythm[: (2 * 120)].any()
 
 
 def test_silence_and_nothing():
