@@ -3,38 +3,61 @@
 from dataclasses import replace
 
 import dagster as dg
+import numpy as np
 import pyarrow as pa
 
 from assets import plots, tables
 from assets.declare import table_asset
-from assets.lineage import Part, Progress
-from assets.partitions import DANCE, lake_key
+from assets.lineage import Part, Progress, Stored, repeatable
+from assets.partitions import DANCE, EVERY, lake_key
+from assets.sequence import Danced, by_matching, load_matches
 from assets.sources import Studio
 from kernels.assembly.timing import blend_widths, cover, trim
 from kernels.graph.costs import PathCosts
 from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
 from kernels.types import Choreography, Float, Int, MotionGraph
 from schemas.choreography import CHOREOGRAPHY
-from schemas.settings import DanceSettings, PathSettings
+from schemas.settings import DanceSettings, PathSettings, Settings
+
+_EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 
 
 @table_asset(
     CHOREOGRAPHY,
     group="dance",
-    code_version="1",
-    settings="path dance",
+    code_version="2",
+    settings="path match_path dance",
     partitions=DANCE,
+    ins={name: _EVERY_CLIP for name in ("canonical_pose", "motion_feature", "motion_beat")},
+    methods={
+        "motion_graph_node": "graph",
+        "motion_graph_edge": "graph",
+        "[path]": "graph",
+        "match": "matching",
+        "music_segment": "matching",
+        "music_feature": "matching",
+        "motion_feature": "matching",
+        "motion_beat": "matching",
+        "canonical_pose": "matching",
+        "[match_path]": "matching",
+    },
 )
 def choreography(
     context: dg.AssetExecutionContext,
-    motion_graph_node: pa.Table,
-    motion_graph_edge: pa.Table,
+    motion_graph_node: Stored,
+    motion_graph_edge: Stored,
+    match: Stored,
+    music_segment: Stored,
+    music_feature: Stored,
+    motion_feature: Stored,
+    motion_beat: Stored,
+    canonical_pose: Stored,
     music_beat: pa.Table,
     song: pa.Table,
     studio: dg.ResourceParam[Studio],
     progress: dg.ResourceParam[Progress],
 ) -> Part:
-    """Find the best way through the motion graph for a song."""
+    """Choose what is danced when: a way through the motion graph, or a sequence of matches."""
     progress.begin("choosing the steps", 1)
     key = lake_key(context.partition_key)
     song_id, method = key.split("|")
@@ -43,9 +66,27 @@ def choreography(
         reason = "; ".join(filter(None, song["reason"].to_pylist())) or "it has no beats"
         raise dg.Failure(f"{song_id}: cannot be danced: {reason}", allow_retries=False)
     duration_s = float(max(song["duration_s"].to_pylist()))
-    settings = studio.settings()
-    graph, clip_ids = tables.to_motion_graph(motion_graph_node, motion_graph_edge)
     beat_s, _ = cover(grid.time_s, duration_s)
+    settings = studio.settings()
+    if method == "graph":
+        graph, clip_ids = tables.to_motion_graph(motion_graph_node.read(), motion_graph_edge.read())
+        danced = by_graph(graph, clip_ids, beat_s, duration_s, settings)
+    else:
+        found = load_matches(song_id, match, music_segment, music_feature, motion_feature, motion_beat)
+        with repeatable():
+            danced = by_matching(found, canonical_pose, beat_s, settings)
+    progress.step()
+    costs = {name: danced.costs.get(name, np.zeros(len(danced.steps.clip_id))) for name in COST_COLUMNS}
+    return Part(key, tables.from_choreography(song_id, method, danced.steps, costs), metadata=danced.metadata)
+
+
+COST_COLUMNS = tuple(name for name in CHOREOGRAPHY.arrow.names if name.endswith("_cost"))
+
+
+def by_graph(
+    graph: MotionGraph, clip_ids: tuple[str, ...], beat_s: Float, duration_s: float, settings: Settings
+) -> Danced:
+    """Find the best way through the motion graph for a song."""
     path, begins = search(graph, beat_s, settings.path)
     steps, kept = chosen_steps(path, graph, beat_s, clip_ids, duration_s, settings.dance)
     costs = {
@@ -55,19 +96,15 @@ def choreography(
         "beat_cost": path.beat_cost[kept],
         "repetition_cost": path.repetition_cost[kept],
     }
-    progress.step()
-    return Part(
-        key,
-        tables.from_choreography(song_id, method, steps, costs),
-        metadata={
-            "cost": path.total_cost,
-            "seams": int(steps.has_seam.sum()),
-            "clips": len(set(steps.clip_id)),
-            "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
-            "begins_at": begins,
-            "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
-        },
-    )
+    metadata = {
+        "cost": path.total_cost,
+        "seams": int(steps.has_seam.sum()),
+        "clips": len(set(steps.clip_id)),
+        "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
+        "begins_at": begins,
+        "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
+    }
+    return Danced(steps, costs, metadata)
 
 
 def search(graph: MotionGraph, beat_s: Float, settings: PathSettings) -> tuple[Path, str]:

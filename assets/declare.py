@@ -14,6 +14,7 @@ warnings.filterwarnings("ignore", category=dg.BetaWarning)
 # Where freshness reads what an asset depends on besides its inputs.
 SETTINGS_KEY = "odori/settings"
 SOURCES_KEY = "odori/sources"
+METHODS_KEY = "odori/methods"
 
 
 def table_asset(
@@ -26,6 +27,7 @@ def table_asset(
     partitions: dg.PartitionsDefinition[str] | None = None,
     ins: Mapping[str, dg.AssetIn] | None = None,
     checks: Mapping[str, str] | None = None,
+    methods: Mapping[str, str] | None = None,
     io_manager: str = "lake",
 ) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
     """Declare an asset that stores a table of its own name.
@@ -35,11 +37,12 @@ def table_asset(
     table : the declaration
     group : area of the asset graph
     code_version : raised by hand when the meaning of the output changes
-    settings : sections of ``odori.toml`` it reads, separated by spaces
+    settings : sections of ``odori.toml`` it reads, or single keys as ``section.key``, separated by spaces
     sources : "clips", "song" or "request" when it reads source files of its partition
     partitions : how it is cut; many sessions or songs are made in one run
     ins : inputs whose partitions do not match its own
     checks : asset checks it yields, by name, each with what it believes
+    methods : of a dance, the one method that needs an input or a section of settings (``[section]``), by its name
     io_manager : who stores it
     """
     made: Callable[[Callable[..., Any]], dg.AssetsDefinition] = dg.asset(
@@ -47,7 +50,7 @@ def table_asset(
         group_name=group,
         code_version=code_version,
         description=table.meaning,
-        metadata=_metadata(table, settings, sources),
+        metadata=_metadata(table, settings, sources, methods or {}),
         io_manager_key=io_manager,
         partitions_def=partitions,
         backfill_policy=_backfill(partitions),
@@ -97,8 +100,11 @@ def _backfill(partitions: dg.PartitionsDefinition[str] | None) -> dg.BackfillPol
     return dg.BackfillPolicy.single_run() if isinstance(partitions, dg.DynamicPartitionsDefinition) else None
 
 
-def _metadata(table: Table, settings: str, sources: str) -> dict[str, Any]:
-    return {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
+def _metadata(table: Table, settings: str, sources: str, methods: Mapping[str, str] | None = None) -> dict[str, Any]:
+    said = {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
+    if methods:
+        said[METHODS_KEY] = " ".join(f"{name}={method}" for name, method in methods.items())
+    return said
 
 
 def column_schema(table: Table) -> dg.TableSchema:

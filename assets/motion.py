@@ -1,11 +1,12 @@
 """From poses to canonical poses and motion beats, session by session and clip by clip."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import dagster as dg
 import pyarrow as pa
 
-from assets import plots, tables
+from assets import matching_plots, matching_tables, plots, tables
 from assets.declare import table_asset
 from assets.lineage import (
     Earlier,
@@ -22,11 +23,13 @@ from assets.partitions import SESSION
 from assets.sources import Studio
 from kernels import rotation
 from kernels.motion.beats import BeatSettings, motion_beats
+from kernels.motion.contacts import foot_contacts
+from kernels.motion.features import contacts_at_feature_rate, motion_features
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.retarget import retarget
-from schemas.motion import CANONICAL_POSE, MOTION_BEAT
-from schemas.settings import MotionBeatSettings
+from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE
+from schemas.settings import FeatureSettings, MotionBeatSettings
 
 
 @table_asset(CANONICAL_POSE, group="motion", code_version="1", partitions=SESSION)
@@ -104,6 +107,49 @@ def motion_beat(
         )
 
     return Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose))
+
+
+@table_asset(MOTION_FEATURE, group="motion", code_version="1", settings="feature", partitions=SESSION)
+def motion_feature(
+    context: dg.AssetExecutionContext,
+    canonical_pose: Stored,
+    studio: dg.ResourceParam[Studio],
+    earlier: dg.ResourceParam[Earlier],
+    progress: dg.ResourceParam[Progress],
+) -> Parts:
+    """Measure weight effort, rhythm, intensity and contacts of every clip."""
+    settings = studio.settings().feature
+    code = version_of(code_version(context, MOTION_FEATURE.name), repr(settings))
+
+    def session(key: str) -> Part:
+        poses = tables.by_clip(canonical_pose.read(key))
+
+        def one(clip_id: str) -> pa.Table:
+            return features_of(poses[clip_id], settings) if clip_id in poses else MOTION_FEATURE.empty()
+
+        made_from = clip_versions(canonical_pose, key, code)
+        part = per_clip(MOTION_FEATURE, key, made_from, one, earlier=earlier, progress=progress)
+        picture = dg.MetadataValue.md(matching_plots.session_features(part.table))
+        return replace(part, metadata={**part.metadata, "features": picture})
+
+    return Parts(session(key) for key in _begun(progress, "motion features", canonical_pose))
+
+
+def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
+    """Features of one clip's canonical poses."""
+    moved = tables.to_canonical_pose(rows)
+    found = motion_features(
+        moved.position_xyz_m,
+        moved.rotation_wxyz[:, 0],
+        parent=CANONICAL.parent,
+        offset_xyz_m=CANONICAL.offset_xyz_m,
+        frame_rate_hz=moved.frame_rate_hz,
+        width_s=settings.width_s,
+    )
+    feet = [CANONICAL.index(name) for name in ("leftFoot", "leftToes", "rightFoot", "rightToes")]
+    stands = foot_contacts(moved.position_xyz_m[:, feet], moved.frame_rate_hz)
+    contact = contacts_at_feature_rate(stands, moved.frame_rate_hz, len(found.rhythm))
+    return matching_tables.from_motion_feature(moved.clip_id, found, contact)
 
 
 def beat_settings(settings: MotionBeatSettings) -> BeatSettings:

@@ -6,17 +6,20 @@ from dataclasses import dataclass, replace
 import dagster as dg
 import numpy as np
 
-from assets import plots, tables
+from assets import matching_plots, matching_tables, plots, tables
 from assets.declare import table_assets
 from assets.formats import audio, beats_file, midi
 from assets.formats.errors import FormatError
-from assets.lineage import Part, Parts, Progress, repeatable, version_of
+from assets.lineage import Part, Parts, Progress, Stored, repeatable, version_of
 from assets.partitions import SONG, lake_key
 from assets.sources import Song, Studio, brief_version, song_version
+from kernels.assembly.timing import cover
 from kernels.music.beats import BeatAnalysis, TempoCandidate, track_beats
+from kernels.music.features import music_features
 from kernels.music.intensity import loudness_db
 from kernels.music.level import change_level, nudge
 from kernels.music.preview import render_preview
+from kernels.music.segments import beat_features, cut_song, novelty
 from kernels.types import BeatGrid, Float
 from schemas import music as schema
 from schemas.settings import BeatsBrief, Settings
@@ -187,3 +190,74 @@ def _row(song: Song, heard: Heard | None, reason: str) -> dict[str, object]:
         "state": "refused" if reason else "read",
         "reason": reason or None,
     }
+
+
+@table_assets(
+    "music_analysis",
+    (schema.MUSIC_FEATURE, schema.MUSIC_SEGMENT),
+    group="music",
+    code_version="1",
+    settings="feature music_segment limits",
+    sources="song",
+    partitions=SONG,
+)
+def music_analysis(
+    context: dg.AssetExecutionContext,
+    music_beat: Stored,
+    song: Stored,
+    studio: dg.ResourceParam[Studio],
+    progress: dg.ResourceParam[Progress],
+) -> Iterator[dg.Output[Parts]]:
+    """Measure rhythm and intensity of every song, and cut it into segments."""
+    songs = studio.sources().songs_by_key()
+    keys = [lake_key(key) for key in context.partition_keys]
+    progress.begin("measuring songs", len(keys))
+    made: list[tuple[Part, Part]] = []
+    for key in keys:
+        version = version_of(song_version(songs.get(key, ())), brief_version(studio, songs.get(key, ())))
+        read = [row for row in song.read(key).to_pylist() if row["state"] == "read"]
+        grid = tables.to_music_beat(music_beat.read(key))
+        if read and len(grid.time_s) >= 2:
+            with repeatable():
+                made.append(_analysed(key, read[0], grid, studio, version))
+        else:
+            made.append(
+                (Part(key, schema.MUSIC_FEATURE.empty(), version), Part(key, schema.MUSIC_SEGMENT.empty(), version))
+            )
+        progress.step()
+    yield dg.Output(Parts([features for features, _ in made]), schema.MUSIC_FEATURE.name)
+    yield dg.Output(Parts([segments for _, segments in made]), schema.MUSIC_SEGMENT.name)
+
+
+def _analysed(key: str, row: dict[str, object], grid: BeatGrid, studio: Studio, version: str) -> tuple[Part, Part]:
+    """Features and segments of one song that can be danced to."""
+    settings = studio.settings()
+    place, duration_s = studio.file(str(row["path"])), float(row["duration_s"])  # type: ignore[arg-type]
+    if row["kind"] == "midi":
+        samples, rate_hz = render_preview(midi.read(place).notes), PREVIEW_RATE_HZ
+    else:
+        decoded = audio.read(place, limit_s=settings.limits.longest_song_s)
+        samples, rate_hz = decoded.samples, decoded.sample_rate_hz
+    found = music_features(
+        samples, rate_hz, beat_s=grid.time_s, duration_s=duration_s, width_s=settings.feature.width_s
+    )
+    grid_s, is_beat = cover(grid.time_s, duration_s)
+    number = np.zeros(len(grid_s), np.int64)
+    number[is_beat] = grid.beat_in_bar_number
+    segments = cut_song(
+        grid_s,
+        duration_s=duration_s,
+        beat_in_bar_number=number,
+        change=novelty(beat_features(samples, rate_hz, grid_s=grid_s)),
+        longest_s=settings.music_segment.longest_s,
+    )
+    picture = matching_plots.song_features(found.time_s, found.rhythm, found.intensity, segments)
+    return (
+        Part(key, matching_tables.from_music_feature(key, found), version),
+        Part(
+            key,
+            matching_tables.from_music_segment(key, segments),
+            version,
+            metadata={"segments": dg.MetadataValue.md(picture)},
+        ),
+    )

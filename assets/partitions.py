@@ -2,9 +2,11 @@
 
 import dagster as dg
 
+from schemas import settings
+
 SESSION = dg.DynamicPartitionsDefinition(name="session")
 SONG = dg.DynamicPartitionsDefinition(name="song")
-METHODS = ("graph",)
+METHODS = settings.METHODS
 METHOD = dg.StaticPartitionsDefinition(list(METHODS))
 DANCE = dg.MultiPartitionsDefinition({"song": SONG, "method": METHOD})
 EVERY = dg.AllPartitionMapping()

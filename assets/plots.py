@@ -67,6 +67,11 @@ def _plain(axes: Any) -> None:  # noqa: ANN401 - matplotlib has no public type s
     axes.tick_params(labelsize=8, colors=_INK)
 
 
+# What the plots of other areas draw with.
+INK, SOFT, WARM, COOL = _INK, _SOFT, _WARM, _COOL
+figure_of, plain = _figure, _plain
+
+
 def session_beats(beats: pa.Table, clips: pa.Table) -> str:
     """Show a session: its clips with label, rate, length and beats, and a raster of the beats."""
     by_clip = tables.by_clip(beats)

@@ -6,7 +6,7 @@ Dagster runs on the studio's own instance, so the UI shows them like any other.
 
 import fcntl
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +16,7 @@ from dagster_shared.error import SerializableErrorInfo
 
 from assets.partitions import SESSION, SONG, dagster_key, lake_key
 from pipelines.freshness import Finding, Freshness
-from pipelines.jobs import JOB_OF_GROUP
+from pipelines.jobs import JOB_OF_GROUP, job_of
 from pipelines.lake import why
 from pipelines.resources import StudioError, StudioFolder
 
@@ -88,6 +88,7 @@ def plan(
     keys: Callable[[str, str], bool] | None = None,
     tried: Collection[Batch] = (),
     given_up: Collection[tuple[str, str]] = (),
+    assets: Container[str] | None = None,
 ) -> list[Batch]:
     """Plan the first stage that has something to do.
 
@@ -100,6 +101,7 @@ def plan(
     keys : of (kind, key), whether a partition may run; None for all
     tried : batches not to be planned again
     given_up : (asset, partition) that could not be made: what reads every partition goes on without them
+    assets : assets that may run; None for all
 
     Returns
     -------
@@ -108,6 +110,8 @@ def plan(
     """
     wanted = set(groups)
     findings = [f for f in state.findings(given_up=given_up) if state.assets[f.asset].group in wanted]
+    if assets is not None:
+        findings = [f for f in findings if f.asset in assets]
     if keys is not None:
         findings = [f for f in findings if keys(state.assets[f.asset].kind, f.key)]
     for stage in STAGES:
@@ -133,7 +137,7 @@ def _batches(todo: Sequence[Finding], state: Freshness, instance: dg.DagsterInst
         keys = [key for key, needed in assets_of.items() if needed == assets]
         node = state.assets[assets[0]]
         for run in _neighbours(keys, node.kind, instance):
-            batches.append(Batch(JOB_OF_GROUP[node.group], assets, tuple(run)))
+            batches.append(Batch(job_of(node.name, node.group), assets, tuple(run)))
     return batches
 
 
@@ -195,6 +199,7 @@ def bring_up_to_date(
     *,
     groups: Iterable[str] = ("capture", "motion", "music", "catalog"),
     keys: Callable[[str, str], bool] | None = None,
+    assets: Container[str] | None = None,
 ) -> Report:
     """Run whatever is not fresh, stage by stage, until all is or nothing more can be done."""
     sync_partitions(instance, state, studio)
@@ -203,7 +208,7 @@ def bring_up_to_date(
     given_up: set[tuple[str, str]] = set()
     groups = tuple(groups)
     while True:
-        batches = plan(state, instance, groups=groups, keys=keys, tried=tried, given_up=given_up)
+        batches = plan(state, instance, groups=groups, keys=keys, assets=assets, tried=tried, given_up=given_up)
         if not batches:
             return report
         for batch in batches:
@@ -226,7 +231,7 @@ def unmade(batch: Batch, state: Freshness) -> set[tuple[str, str]]:
     """Partitions a failed batch leaves as they were, and those of the same key that are made from them."""
     assets = set(batch.assets)
     for node in state.assets.values():  # inputs come first
-        if node.kind == state.assets[batch.assets[0]].kind and assets & set(node.inputs):
+        if node.kind == state.assets[batch.assets[0]].kind and assets & set(node.inputs_of(batch.keys[0])):
             assets.add(node.name)
     return {(asset, key) for asset in assets for key in batch.keys}
 

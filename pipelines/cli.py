@@ -72,7 +72,10 @@ def dance(
         list[str], typer.Argument(metavar="SONG...", help="Key or file name of a song; several, or 'all'.")
     ],
     studio: StudioOption = None,
-    method: Annotated[str, typer.Option("--method", help="How the steps are chosen: graph.")] = "graph",
+    method: Annotated[
+        str | None,
+        typer.Option("--method", help="How the steps are chosen: graph or matching; else as the brief says, or graph."),
+    ] = None,
     fps: Annotated[
         float | None, typer.Option("--fps", help="Frames a second of the stage.", min=1.0, max=240.0)
     ] = None,
@@ -81,13 +84,14 @@ def dance(
 ) -> None:
     """Dance a song: a USD stage with the music in it.
 
-    Examples: odori dance waltz.mp3 · odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance all
+    Examples: odori dance waltz.mp3 · odori dance waltz --method matching · odori dance all ·
+    odori dance waltz --fps 60 --out /show/waltz.usdz
     """
     _dance(studio, songs, method, fps, out, as_json)
 
 
 def _dance(
-    studio: Path | None, songs: list[str], method: str, fps: float | None, out: Path | None, as_json: bool
+    studio: Path | None, songs: list[str], method: str | None, fps: float | None, out: Path | None, as_json: bool
 ) -> None:
     from pipelines import commands
 

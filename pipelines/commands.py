@@ -3,7 +3,7 @@
 import difflib
 import json
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -57,8 +57,14 @@ class _Session:
         self.state = freshness(studio)
         self._progress = progress
 
-    def run(self, groups: Iterable[str], *, keys: Callable[[str, str], bool] | None = None) -> building.Report:
-        """Bring groups of assets up to date."""
+    def run(
+        self,
+        groups: Iterable[str],
+        *,
+        keys: Callable[[str, str], bool] | None = None,
+        assets: Container[str] | None = None,
+    ) -> building.Report:
+        """Bring groups of assets, or some assets of them, up to date."""
         bar: Progress = self._progress()
         try:
             with building.exclusive(self.studio):
@@ -66,7 +72,7 @@ class _Session:
                 building.clear_after_kill(self.studio, instance)
                 definitions = build_definitions(self.studio, progress=bar)
                 return building.bring_up_to_date(
-                    self.studio, definitions, instance, self.state, groups=groups, keys=keys
+                    self.studio, definitions, instance, self.state, groups=groups, keys=keys, assets=assets
                 )
         except DBAPIError as error:  # what was stored before is whole: tables are written beside and renamed
             place = self.studio.dagster_home
@@ -133,14 +139,14 @@ def dance(
     root: Path,
     wanted: Sequence[str],
     *,
-    method: str,
+    method: str | None = None,
     frame_rate_hz: float | None,
     out: Path | None,
     progress: Callable[[], Any],
 ) -> Outcome:
-    """Dance songs, building first what they need."""
+    """Dance songs, building first what they need and nothing else; by their briefs' methods where none is given."""
     studio = existing(root)
-    if method not in METHODS:
+    if method is not None and method not in METHODS:
         raise StudioError(f"--method: want one of {', '.join(METHODS)}, got {method!r}")
     if out is not None:
         _check_out(out)
@@ -148,30 +154,41 @@ def dance(
     songs = _wanted(work.state, wanted, studio)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
-    keys = {f"{song.key}|{method}" for song in songs}
+    methods = {song.key: method or _briefed_method(studio, song) for song in songs}
+    keys = {f"{song}|{chosen}" for song, chosen in methods.items()}
     for key in sorted(keys):
         studio.remember(key, Request(frame_rate_hz or 0.0))
     names = {song.key for song in songs}
     report = work.run(
         building.GROUPS,
         keys=lambda kind, key: key in keys if kind == "dance" else key in names if kind == "song" else True,
+        assets=set().union(*(work.state.needed_for(key) for key in keys)),
     )
     state = freshness(studio)
     refused = {f["key"]: f["reason"] for f in _songs(state, studio) if f["state"] == "refused"}
     made, troubles = [], []
     for song in songs:
-        found = studio.lake.stamp("usd_animation", f"{song.key}|{method}")
+        key = f"{song.key}|{methods[song.key]}"
+        found = studio.lake.stamp("usd_animation", key)
         if refused.get(song.key):
             troubles.append(f"refused: {song.path}: {refused[song.key]}")
-        elif found is None or state.state("usd_animation", f"{song.key}|{method}").state != "fresh":
+        elif found is None or state.state("usd_animation", key).state != "fresh":
             troubles += [f"failed: {f}" for f in report.failed] or [f"failed: {song.path}"]
         else:
-            made.append(_dance_facts(studio, song.key, method))
+            made.append(_dance_facts(studio, song.key, methods[song.key]))
     if out is not None and made:
         _copy(made[0], out)
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
     facts = _dance_json(made, troubles, len(songs))
     return Outcome(status, facts, "\n".join(_dance_report(d) for d in made), list(dict.fromkeys(troubles)))
+
+
+def _briefed_method(studio: StudioFolder, song: Song) -> str:
+    """Find the method a song's brief names; the usual one where the brief cannot be read (its song is refused)."""
+    try:
+        return studio.brief(song).method
+    except FormatError:
+        return METHODS[0]
 
 
 def _dance_json(made: list[dict[str, Any]], troubles: list[str], n_asked: int) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import dagster as dg
 from pipelines import jobs, schedules, sensors
 from pipelines.collection import ASSETS, freshness
 from pipelines.io_managers import EarlierTables, LakeIOManager, StageIOManager
-from pipelines.resources import NoProgress, StudioFolder, pair_distance, studio_from_environment
+from pipelines.resources import NoProgress, StudioFolder, matcher, pair_distance, studio_from_environment
 
 
 def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> dg.Definitions:  # noqa: ANN401 - resources are of any type
@@ -26,6 +26,9 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         "progress": NoProgress(),
         "pair_distance": dg.ResourceDefinition(
             lambda context: pair_distance(context.resources.studio.settings().opencl), required_resource_keys={"studio"}
+        ),
+        "matcher": dg.ResourceDefinition(
+            lambda context: matcher(context.resources.studio.settings()), required_resource_keys={"studio"}
         ),
         "lake": dg.IOManagerDefinition(
             lambda context: LakeIOManager(context.resources.studio.lake, freshness(context.resources.studio)),

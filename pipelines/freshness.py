@@ -14,7 +14,7 @@ from typing import Literal
 import dagster as dg
 
 from assets import sources as source_kinds
-from assets.declare import SETTINGS_KEY, SOURCES_KEY
+from assets.declare import METHODS_KEY, SETTINGS_KEY, SOURCES_KEY
 from assets.lineage import Stamp, version_of
 from assets.partitions import METHODS
 from assets.sources import Sources
@@ -28,7 +28,11 @@ State = Literal["fresh", "stale", "missing", "waiting"]
 
 @dataclass(frozen=True)
 class Node:
-    """One asset as freshness sees it; ``together`` are the assets made in the same pass, itself included."""
+    """One asset as freshness sees it.
+
+    ``together`` are the assets made in the same pass, itself included; ``methods`` says, of an input or a section of
+    settings (in brackets), which one method of dancing needs it: every method does where nothing is said.
+    """
 
     name: str
     group: str
@@ -39,6 +43,15 @@ class Node:
     sources: str
     together: tuple[str, ...]
     writes_stages: bool = False
+    methods: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def needs(self, name: str, key: str) -> bool:
+        """Whether a partition of this asset is made from an input, or from a section of settings in brackets."""
+        return self.kind != "dance" or self.methods.get(name, key.split("|")[-1]) == key.split("|")[-1]
+
+    def inputs_of(self, key: str) -> list[str]:
+        """List the inputs that a partition is made from."""
+        return [name for name in self.inputs if self.needs(name, key)]
 
 
 @dataclass(frozen=True)
@@ -67,6 +80,7 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
                 str(spec.metadata.get(SOURCES_KEY, "")),
                 together,
                 definition.get_io_manager_key_for_asset_key(spec.key) == STAGE_IO_MANAGER,
+                dict(said.split("=") for said in str(spec.metadata.get(METHODS_KEY, "")).split()),
             )
     ordered: dict[str, Node] = {}
     while len(ordered) < len(found):
@@ -132,6 +146,23 @@ class Freshness:
             self._stamps[asset, key] = self._lake.stamp(asset, key)
         return self._stamps[asset, key]
 
+    def partitions(self, asset: str) -> list[str]:
+        """Partitions of an asset there should be; of what only dances are made from, those of songs danced so."""
+        node = self.assets[asset]
+        found = self.keys(node.kind)
+        if node.group != "dance" or node.kind != "song":
+            return found
+        danced = {k.split("|")[0] for k in self.keys("dance") if asset in self.needed_for(k)}
+        return [key for key in found if key in danced | set(self._lake.keys(asset))]
+
+    def needed_for(self, key: str) -> set[str]:
+        """Assets a dance is made from, its own included: those of the other methods are not."""
+        found: set[str] = set()
+        for node in reversed(list(self.assets.values())):
+            if node.kind == "dance" or node.name in found:
+                found |= {node.name, *node.inputs_of(key)}
+        return found
+
     def keys(self, kind: Kind) -> list[str]:
         """Partitions there should be; of dances, those asked for so far."""
         if kind == "session":
@@ -144,10 +175,16 @@ class Freshness:
             return sorted(k for k in asked if k.split("|")[0] in songs)
         return [""]
 
-    def settings_version(self, asset: str) -> str:
-        """Version of the settings an asset reads."""
+    def settings_version(self, asset: str, key: str = "") -> str:
+        """Version of the settings an asset reads for a partition."""
         settings = dataclasses.asdict(self._studio.settings())
-        return source_kinds.fingerprint({section: settings[section] for section in self.assets[asset].settings})
+        node = self.assets[asset]
+        read = {}
+        for name in node.settings:
+            section, _, one = name.partition(".")
+            if node.needs(f"[{name}]", key):
+                read[name] = settings[section][one] if one else settings[section]
+        return source_kinds.fingerprint(read)
 
     def source_version(self, asset: str, key: str) -> str:
         """Version of the source files an asset reads; empty when it reads none."""
@@ -169,7 +206,7 @@ class Freshness:
         """
         node = self.assets[asset]
         versions = {}
-        for name in node.inputs:
+        for name in node.inputs_of(key):
             of = self.assets[name].kind
             stamps = [(k, self.stamp(name, k)) for k in self._input_keys(node.kind, of, name, key)]
             if self._reads_every(node.kind, of):
@@ -198,7 +235,7 @@ class Freshness:
         node = self.assets[asset]
         inputs = self.inputs(asset, key)
         waits = set(pending)
-        for name in node.inputs:
+        for name in node.inputs_of(key):
             if any((name, k) in waits for k in self._input_keys(node.kind, self.assets[name].kind, name, key)):
                 return Finding(asset, key, "waiting", f"{name} has to be made first")
         if inputs is None:
@@ -208,7 +245,7 @@ class Freshness:
             return Finding(asset, key, "missing", "never made")
         if stamp.code_version != node.code_version:
             return Finding(asset, key, "stale", f"code version {stamp.code_version} is now {node.code_version}")
-        if stamp.settings != self.settings_version(asset):
+        if stamp.settings != self.settings_version(asset, key):
             return Finding(asset, key, "stale", f"settings [{'], ['.join(node.settings)}] changed")
         expected = inputs | ({"sources": self.source_version(asset, key)} if node.sources else {})
         changed = sorted(name for name in expected if stamp.inputs.get(name) != expected[name])
@@ -231,7 +268,7 @@ class Freshness:
         found: list[Finding] = []
         pending: set[tuple[str, str]] = set()
         for node in self.assets.values():
-            for key in self.keys(node.kind):
+            for key in self.partitions(node.name):
                 finding = self.state(node.name, key, pending=pending)
                 if finding.state != "fresh" and (node.name, key) not in given_up:
                     pending.add((node.name, key))

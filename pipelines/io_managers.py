@@ -92,7 +92,7 @@ class LakeIOManager(dg.IOManager):
             inputs = inputs | {"sources": part.sources}
         stamp = Stamp(
             self._freshness.assets[asset].code_version,
-            self._freshness.settings_version(asset),
+            self._freshness.settings_version(asset, part.key),
             inputs,
             content_version(table),
             part.clips,

@@ -21,7 +21,17 @@ rebuild_music = dg.define_asset_job(
 rebuild_catalog = dg.define_asset_job(
     "rebuild_catalog", dg.AssetSelection.groups("catalog"), description="Build the motion graph over all clips."
 )
-make_dance = dg.define_asset_job(
-    "make_dance", dg.AssetSelection.groups("dance"), description="Dance a song with a method, to the finished stage."
+match_songs = dg.define_asset_job(
+    "match_songs", dg.AssetSelection.assets("match"), description="Find the clips that match each segment of a song."
 )
-JOBS = [rebuild_motion, rebuild_music, rebuild_catalog, make_dance]
+make_dance = dg.define_asset_job(
+    "make_dance",
+    dg.AssetSelection.groups("dance") - dg.AssetSelection.assets("match"),
+    description="Dance a song with a method, to the finished stage.",
+)
+JOBS = [rebuild_motion, rebuild_music, rebuild_catalog, match_songs, make_dance]
+
+
+def job_of(asset: str, group: str) -> str:
+    """Name of the job an asset is made by: assets of one job are cut alike."""
+    return "match_songs" if asset == "match" else JOB_OF_GROUP[group]

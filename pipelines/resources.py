@@ -14,6 +14,7 @@ from upath import UPath
 from assets import sources
 from assets.formats.settings import read_settings
 from assets.formats.tree import HashCache
+from assets.matching import SegmentMatcher
 from assets.sources import Request, Song, Sources
 from kernels.graph.distance import PairDistance
 from pipelines.lake import Lake, write_beside
@@ -128,6 +129,17 @@ class NoProgress:
 
     def step(self) -> None:
         """One more is done."""
+
+
+def matcher(settings: Settings) -> SegmentMatcher:
+    """Build the search for matches on the device the settings name; OpenCL is loaded here, not with the module."""
+    import pyopencl as cl
+
+    from kernels.matching.search import Matcher
+    from kernels.opencl.device import pick_device
+
+    device = pick_device(settings.opencl.device)
+    return Matcher(cl.Context([device]), memory_bytes=int(settings.matching.memory_mb * 2**20))
 
 
 def pair_distance(settings: OpenClSettings) -> PairDistance:

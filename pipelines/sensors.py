@@ -60,7 +60,7 @@ def _made_from(state: Freshness, batch: build.Batch) -> list[object]:
             getattr(state.stamp(asset, key), "content", ""),
             state.inputs(asset, key),
             state.source_version(asset, key),
-            state.settings_version(asset),
+            state.settings_version(asset, key),
             state.assets[asset].code_version,
         ]
         for asset in batch.assets

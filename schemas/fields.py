@@ -33,6 +33,10 @@ POSITION_XYZ_M = Column("position_xyz_m", VECTORS, "World position of each joint
 BEAT_INDEX = Column("beat_index", pa.int32(), "Beat of its clip or song, from 0.")
 CONFIDENCE_RATIO = Column("confidence", pa.float32(), "How sure the detector is, 0 to 1.")
 
+RHYTHM = Column("rhythm", pa.float32(), "Stops of the body, or onsets at beats, as bumps; the 99th percentile is 1.")
+INTENSITY = Column("intensity", pa.float32(), "Drive of the motion, or level of the music; the 99th percentile is 1.")
+SEGMENT_INDEX = Column("segment_index", pa.int32(), "Segment of its song, from 0.")
+
 WARP_RATIO = Column(
     "warp_ratio", pa.float32(), "Song time over clip time; above 1 the clip plays slower than recorded."
 )

@@ -82,6 +82,30 @@ CANONICAL_POSE = Table(
     columns=(f.CLIP_ID, f.FRAME_INDEX, f.TIME_S, f.ROOT_XYZ_M, f.ROTATION_WXYZ, f.POSITION_XYZ_M),
 )
 
+MOTION_FEATURE = Table(
+    name="motion_feature",
+    version=1,
+    meaning="What one clip does at one instant, 120 a second.",
+    key=("clip_id", "frame_index"),
+    columns=(
+        f.CLIP_ID,
+        f.FRAME_INDEX,
+        f.TIME_S,
+        f.RHYTHM,
+        f.INTENSITY,
+        Column(
+            "weight_effort_rad_per_s",
+            pa.float32(),
+            "Speed at which the body's links turn, body-centred, weighted by length.",
+        ),
+        Column(
+            "peak_effort_rad_per_s", pa.float32(), "Largest weight effort between two stops: intensity before scaling."
+        ),
+        Column("is_left_contact", pa.bool_(), "Whether the left foot stands on the floor."),
+        Column("is_right_contact", pa.bool_(), "Whether the right foot stands on the floor."),
+    ),
+)
+
 MOTION_BEAT = Table(
     name="motion_beat",
     version=1,

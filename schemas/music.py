@@ -66,3 +66,27 @@ MUSIC_LOUDNESS = Table(
         Column("loudness_db", pa.float32(), "Short-time A-weighted level relative to full scale."),
     ),
 )
+
+MUSIC_FEATURE = Table(
+    name="music_feature",
+    version=1,
+    meaning="What one song does at one instant, 120 a second.",
+    key=("song_id", "time_s"),
+    columns=(f.SONG_ID, f.TIME_S, f.RHYTHM, f.INTENSITY),
+)
+
+MUSIC_SEGMENT = Table(
+    name="music_segment",
+    version=1,
+    meaning="One span of a song that is danced with one piece of one clip.",
+    key=("song_id", "segment_index"),
+    columns=(
+        f.SONG_ID,
+        f.SEGMENT_INDEX,
+        Column("start_s", pa.float64(), "Start in the song: a beat, or the first sample."),
+        Column("end_s", pa.float64(), "End in the song: the next segment's start, or the song's end."),
+        Column("start_frame_index", pa.int32(), "First value of the song's or the clip's features, 120 a second."),
+        Column("frame_count", pa.int32(), "Values of the song's features."),
+        Column("novelty_ratio", pa.float32(), "How much the music changes at the start, against its largest change."),
+    ),
+)

@@ -9,6 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+METHODS = ("graph", "matching")
+"""Ways to choose a choreography; the first is the usual one."""
+
 
 def key(
     default: Any,  # noqa: ANN401 - a default may be of any type
@@ -100,6 +103,50 @@ class PathSettings(_Checked):
 
 
 @dataclass(frozen=True)
+class FeatureSettings(_Checked):
+    """What clips and songs are compared by."""
+
+    rhythm: str = key("bumps", "'bumps', or 'impulses': one value a stop or beat, raw.", values=("bumps", "impulses"))
+    bump_width_s: float = key(0.05, "Standard deviation of a bump of rhythm.", least=0.005, most=0.5)
+
+    @property
+    def width_s(self) -> float:
+        """Width of a bump; 0 for raw impulses."""
+        return self.bump_width_s if self.rhythm == "bumps" else 0.0
+
+
+@dataclass(frozen=True)
+class MusicSegmentSettings(_Checked):
+    """How a song is cut into what one clip dances."""
+
+    longest_s: float = key(8.0, "No segment is longer.", least=1, most=8)
+
+
+@dataclass(frozen=True)
+class MatchingSettings(_Checked):
+    """Which clips a song is compared with, and how many are kept."""
+
+    candidates: int = key(20, "Clips kept for every segment.", least=1, most=1000)
+    memory_mb: float = key(2048.0, "Device memory the search may use; clips are streamed through it.", least=16)
+
+
+@dataclass(frozen=True)
+class MatchPathSettings(_Checked):
+    """What a dance chosen among matches costs."""
+
+    match_weight: float = key(1.0, "Weight of rhythm unlike the music's.", least=0)
+    intensity_weight: float = key(1.0, "Weight of intensity unlike the music's.", least=0)
+    seam_weight: float = key(0.5, "Weight of seams between unlike poses.", least=0)
+    repetition_weight: float = key(1.0, "Weight of showing again what was shown.", least=0)
+    snap_loss_ratio: float = key(
+        0.05,
+        "A piece starts on a beat of its clip where that loses less than this share of its score.",
+        least=0,
+        most=1,
+    )
+
+
+@dataclass(frozen=True)
 class DanceSettings(_Checked):
     """What a dance looks like on disk."""
 
@@ -128,6 +175,10 @@ class Settings:
     music_beat: MusicBeatSettings = field(default_factory=MusicBeatSettings)
     motion_graph: MotionGraphSettings = field(default_factory=MotionGraphSettings)
     path: PathSettings = field(default_factory=PathSettings)
+    feature: FeatureSettings = field(default_factory=FeatureSettings)
+    music_segment: MusicSegmentSettings = field(default_factory=MusicSegmentSettings)
+    matching: MatchingSettings = field(default_factory=MatchingSettings)
+    match_path: MatchPathSettings = field(default_factory=MatchPathSettings)
     dance: DanceSettings = field(default_factory=DanceSettings)
     opencl: OpenClSettings = field(default_factory=OpenClSettings)
 
@@ -143,7 +194,8 @@ class BeatsBrief(_Checked):
 
 
 @dataclass(frozen=True)
-class Brief:
+class Brief(_Checked):
     """``songs/NAME.brief.toml``: what a person wants of one song."""
 
+    method: str = key(METHODS[0], "How its dance is chosen where the command does not say.", values=METHODS)
     beats: BeatsBrief = field(default_factory=BeatsBrief)

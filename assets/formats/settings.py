@@ -75,7 +75,7 @@ def _record(data: Mapping[str, Any], kind: type[Record], path: str, section: str
     try:
         return kind(**values)
     except ValueError as error:
-        raise FormatError(path, 0, f"[{section}] {error}") from error
+        raise FormatError(path, 0, f"[{section}] {error}" if section else str(error)) from error
 
 
 def _value(value: Any, kind: Any, path: str, full: str) -> Any:  # noqa: ANN401 - TOML values are of any type

@@ -1,0 +1,115 @@
+"""Matches: for every segment of a song, the clips whose rhythm is most like its own."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+import dagster as dg
+import numpy as np
+from numpy.typing import NDArray
+
+from assets import matching_plots, matching_tables
+from assets.declare import table_asset
+from assets.lineage import Part, Parts, Progress, Stored
+from assets.matching_tables import Rhythm, StoredMatches
+from assets.partitions import EVERY, SONG, lake_key
+from assets.sources import Studio
+from kernels.matching.score import Match
+from kernels.music.segments import Segments
+from schemas.matching import MATCH
+
+
+class SegmentMatcher(Protocol):
+    """Finds the best clips of segments; see :class:`kernels.matching.search.Matcher`."""
+
+    def matches(
+        self, segments: Sequence[NDArray[Any]], clips: Sequence[NDArray[Any]], *, k: int
+    ) -> Sequence[Sequence[Match]]:
+        """Find the k best clips of every segment."""
+        ...
+
+
+@table_asset(
+    MATCH,
+    group="dance",
+    code_version="1",
+    settings="matching.candidates",
+    partitions=SONG,
+    ins={"motion_feature": dg.AssetIn(partition_mapping=EVERY)},
+    checks={"every_segment": "Every segment has clips it may be danced with, and where there is music they fit it."},
+)
+def match(
+    context: dg.AssetExecutionContext,
+    music_segment: Stored,
+    music_feature: Stored,
+    motion_feature: Stored,
+    studio: dg.ResourceParam[Studio],
+    matcher: dg.ResourceParam[SegmentMatcher],
+    progress: dg.ResourceParam[Progress],
+) -> Iterator[dg.Output[Parts] | dg.AssetCheckResult]:
+    """Compare every segment of a song with every clip at every scale and start, exactly."""
+    keys = [lake_key(key) for key in context.partition_keys]
+    progress.begin("matching songs", len(keys))
+    rhythms, left_out = catalogue(motion_feature)
+    clip_ids = sorted(rhythms)
+    made, poor = [], []
+    for key in keys:
+        segments = matching_tables.to_music_segment(music_segment.read(key))
+        rhythm = np.asarray(music_feature.read(key)["rhythm"].to_numpy(), np.float32)
+        parts = matching_tables.segment_rhythms(segments, rhythm)
+        clips = [rhythms[clip] for clip in clip_ids]
+        k = studio.settings().matching.candidates
+        found = matcher.matches(parts, clips, k=k) if parts and clips else [[] for _ in parts]
+        table = matching_tables.from_matches(key, found, clip_ids)
+        stored = matching_tables.to_matches(table, len(parts))
+        lacking = [i for i, m in enumerate(stored) if not len(m.score) or (parts[i].any() and not m.score[0] > 0)]
+        poor += [f"{key}: segment {i}" for i in lacking]
+        metadata = {
+            "clips": len(clip_ids),
+            "segments": len(parts),
+            "clips_left_out": "; ".join(left_out) or "none",
+            "matches": dg.MetadataValue.md(matching_plots.segment_matches(segments, stored)),
+            "curves": dg.MetadataValue.md(_curves(segments, parts, stored, rhythms)),
+        }
+        made.append(Part(key, table, metadata=metadata))
+        progress.step()
+    yield dg.Output(Parts(made))
+    yield dg.AssetCheckResult(
+        check_name="every_segment",
+        asset_key=MATCH.name,
+        passed=not poor and not left_out,
+        severity=dg.AssetCheckSeverity.WARN,
+        metadata={"without_match": ", ".join(poor[:40]) or "none", "clips_left_out": ", ".join(left_out) or "none"},
+    )
+
+
+def catalogue(motion_feature: Stored) -> tuple[dict[str, Rhythm], list[str]]:
+    """Rhythm of every clip as stored, and the clips left out because theirs is none to compare with."""
+    rhythms: dict[str, Rhythm] = {}
+    left_out = []
+    for key in motion_feature.keys:
+        for clip, rhythm in matching_tables.to_rhythms(motion_feature.read(key)).items():
+            if np.isfinite(rhythm).all() and (rhythm >= 0).all():
+                rhythms[clip] = rhythm
+            else:
+                left_out.append(f"{clip}: its rhythm is not finite")
+    return rhythms, left_out
+
+
+def _curves(
+    segments: Segments, parts: Sequence[Rhythm], stored: Sequence[StoredMatches], rhythms: dict[str, Rhythm]
+) -> str:
+    """Lay the rhythm of the segment with the best score of all over that of its best clips."""
+    scored = [(float(m.mutual_ratio[0]), -i) for i, m in enumerate(stored) if len(m.score)]
+    if not scored:
+        return "no segment has a match"
+    index = -max(scored)[1]
+    best = stored[index]
+    motions = []
+    for rank in range(min(4, len(best.score))):
+        clip, scale = best.clip_ids[rank], best.numerator[rank] / 50
+        at = best.start_frame_index[rank] + scale * np.arange(len(parts[index]))
+        motion = np.interp(at, np.arange(len(rhythms[clip])), rhythms[clip])
+        name = f"{rank + 1}: {clip} at {scale:.2f}, C {best.score[rank]:.2f}, mutual {best.mutual_ratio[rank]:.2f}"
+        motions.append((name, np.asarray(motion, np.float64)))
+    title = f"segment {index}, {segments.start_s[index]:.2f} to {segments.end_s[index]:.2f} s"
+    return matching_plots.matched_curves(title, np.asarray(parts[index], np.float64), motions)

@@ -1,0 +1,141 @@
+"""Features, segments and matches to Arrow tables and back; conventions as in :mod:`assets.tables`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from assets.tables import by_clip, to_numbers
+from kernels.matching.score import SCALES, Match
+from kernels.motion.features import MotionFeatures
+from kernels.music.features import MusicFeatures
+from kernels.music.segments import Segments
+from kernels.types import Float, Int
+from schemas.matching import MATCH
+from schemas.motion import MOTION_FEATURE
+from schemas.music import MUSIC_FEATURE, MUSIC_SEGMENT
+
+Rhythm = NDArray[np.float32]
+
+
+def from_motion_feature(clip_id: str, found: MotionFeatures, contact: NDArray[np.bool_]) -> pa.Table:
+    """Pack a clip's features, F rows; ``contact`` is (F, 2), left first."""
+    f = len(found.rhythm)
+    columns = [
+        pa.array([clip_id] * f, pa.string()),
+        pa.array(np.arange(f), pa.int32()),
+        pa.array(found.time_s),
+        pa.array(found.rhythm, pa.float32()),
+        pa.array(found.intensity, pa.float32()),
+        pa.array(found.effort_rad_per_s, pa.float32()),
+        pa.array(found.peak_effort_rad_per_s, pa.float32()),
+        pa.array(contact[:, 0]),
+        pa.array(contact[:, 1]),
+    ]
+    return MOTION_FEATURE.check(pa.table(columns, schema=MOTION_FEATURE.arrow))
+
+
+def to_rhythms(table: pa.Table) -> dict[str, Rhythm]:
+    """Unpack the rhythm of every clip as it is stored: float32, in the table's order of clips."""
+    return {clip: np.asarray(to_numbers(rows["rhythm"]), np.float32) for clip, rows in by_clip(table).items()}
+
+
+def from_music_feature(song_id: str, found: MusicFeatures) -> pa.Table:
+    """Pack a song's features, F rows."""
+    columns = [
+        pa.array([song_id] * len(found.rhythm), pa.string()),
+        pa.array(found.time_s),
+        pa.array(found.rhythm, pa.float32()),
+        pa.array(found.intensity, pa.float32()),
+    ]
+    return MUSIC_FEATURE.check(pa.table(columns, schema=MUSIC_FEATURE.arrow))
+
+
+def from_music_segment(song_id: str, segments: Segments) -> pa.Table:
+    """Pack a song's segments, S rows."""
+    s = len(segments.start_s)
+    columns = [
+        pa.array([song_id] * s, pa.string()),
+        pa.array(np.arange(s), pa.int32()),
+        pa.array(segments.start_s),
+        pa.array(segments.end_s),
+        pa.array(segments.start_frame_index, pa.int32()),
+        pa.array(segments.frame_count, pa.int32()),
+        pa.array(segments.novelty, pa.float32()),
+    ]
+    return MUSIC_SEGMENT.check(pa.table(columns, schema=MUSIC_SEGMENT.arrow))
+
+
+def to_music_segment(rows: pa.Table) -> Segments:
+    """Unpack a song's segments."""
+    return Segments(
+        to_numbers(rows["start_s"]).astype(np.float64),
+        to_numbers(rows["end_s"]).astype(np.float64),
+        to_numbers(rows["start_frame_index"]).astype(np.int64),
+        to_numbers(rows["frame_count"]).astype(np.int64),
+        to_numbers(rows["novelty_ratio"]).astype(np.float64),
+    )
+
+
+def segment_rhythms(segments: Segments, rhythm: Rhythm) -> list[Rhythm]:
+    """Cut a song's rhythm into its segments."""
+    ends = segments.start_frame_index + segments.frame_count
+    return [rhythm[a:b] for a, b in zip(segments.start_frame_index, ends, strict=True)]
+
+
+def from_matches(song_id: str, found: Sequence[Sequence[Match]], clip_ids: Sequence[str]) -> pa.Table:
+    """Pack the matches of a song, best first within each segment; ``clip_ids`` by clip index."""
+    every = [m for matches in found for m in matches]
+    columns = [
+        pa.array([song_id] * len(every), pa.string()),
+        pa.array([m.segment_index for m in every], pa.int32()),
+        pa.array([m.rank_number for m in every], pa.int32()),
+        pa.array([clip_ids[m.clip_index] for m in every], pa.string()),
+        pa.array([SCALES[m.scale_index] for m in every], pa.float32()),
+        pa.array([m.start_frame_index for m in every], pa.int32()),
+        pa.array([m.score for m in every], pa.float64()),
+        pa.array([m.music_ratio for m in every], pa.float64()),
+        pa.array([m.mutual_ratio for m in every], pa.float64()),
+    ]
+    return MATCH.check(pa.table(columns, schema=MATCH.arrow))
+
+
+@dataclass(frozen=True, eq=False)
+class StoredMatches:
+    """Matches of one segment, (N,) each, best first.
+
+    Parameters
+    ----------
+    clip_ids : N names
+    numerator : int64, scale times 50
+    start_frame_index : int64
+    score, music_ratio, mutual_ratio : float64
+    """
+
+    clip_ids: tuple[str, ...]
+    numerator: Int
+    start_frame_index: Int
+    score: Float
+    music_ratio: Float
+    mutual_ratio: Float
+
+
+def to_matches(table: pa.Table, n_segments: int) -> list[StoredMatches]:
+    """Unpack the matches of a song, one record a segment, empty for a segment without."""
+    segment = to_numbers(table["segment_index"])
+    found = []
+    for index in range(n_segments):
+        rows = table.filter(pa.array(segment == index)).sort_by("rank_number")
+        found.append(
+            StoredMatches(
+                tuple(rows["clip_id"].to_pylist()),
+                np.rint(to_numbers(rows["scale_ratio"]).astype(np.float64) * 50).astype(np.int64),
+                to_numbers(rows["start_frame_index"]).astype(np.int64),
+                *(to_numbers(rows[c]).astype(np.float64) for c in ("score", "music_ratio", "mutual_ratio")),
+            )
+        )
+    return found

@@ -1,0 +1,356 @@
+"""From the matches of a song to its steps: pieces of clips, how they join, and the best sequence of them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import dagster as dg
+import numpy as np
+import pyarrow as pa
+
+from assets import matching_plots, matching_tables, plots, tables
+from assets.lineage import Stored
+from assets.matching_tables import Rhythm, StoredMatches
+from kernels.assembly.timing import blend_widths
+from kernels.matching import connect, intensity, path
+from kernels.matching.pieces import longest_first, motion_under, snap_start, split_span
+from kernels.matching.score import SCALE_DENOMINATOR
+from kernels.motion.features import FEATURE_RATE_HZ, at_feature_rate, link_directions, link_weights
+from kernels.motion.velocity import usable_frames
+from kernels.music.segments import Segments
+from kernels.skeleton.canonical import CANONICAL
+from kernels.types import Choreography, Float
+from schemas.settings import MatchPathSettings, Settings
+
+EASY_WARP = (0.90, 1.10)
+APART_S = 0.1
+"""How far apart moments of one clip are that pass for neighbours: a quarter of the usual blend."""
+
+WARP_COST, UNEASY_COST, MARGIN_COST = 0.1, 3.0, 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Danced:
+    """Steps a method chose, their costs by column (0 for the columns of other methods), and what to show of them."""
+
+    steps: Choreography
+    costs: Mapping[str, Float]
+    metadata: Mapping[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class ClipFeatures:
+    """What the choice asks of a clip: (F,) rhythm and intensity before scaling at 120 Hz, (B,) beats in seconds."""
+
+    rhythm: Rhythm
+    peak_effort: Float
+    beat_s: Float
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds from the first value to the last."""
+        return max(len(self.rhythm) - 1, 0) / FEATURE_RATE_HZ
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedMatches:
+    """A song's segments and music, their matches, and the clips these are in."""
+
+    segments: Segments
+    rhythm: Rhythm
+    intensity: Float
+    matches: Sequence[StoredMatches]
+    clips: Mapping[str, ClipFeatures]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of a clip a span of the song may be danced with, and its own costs.
+
+    ``start_s`` and ``end_s`` are seconds of the clip; ``rank_number`` is 0 where it fills a span without a match.
+    """
+
+    clip_id: str
+    start_s: float
+    end_s: float
+    rank_number: int
+    match_cost: float
+    intensity_cost: float
+    warp_cost: float
+    is_snapped: bool = False
+
+    @property
+    def cost(self) -> float:
+        """Sum of its own costs."""
+        return self.match_cost + self.intensity_cost + self.warp_cost
+
+
+def load_matches(
+    song_id: str,
+    match: Stored,
+    music_segment: Stored,
+    music_feature: Stored,
+    motion_feature: Stored,
+    motion_beat: Stored,
+) -> LoadedMatches:
+    """Read a song's matches and the clips they name; where a segment has none, the longest clips as well."""
+    segments = matching_tables.to_music_segment(music_segment.read(song_id))
+    matches = matching_tables.to_matches(match.read(song_id), len(segments.start_s))
+    wanted = {clip for m in matches for clip in m.clip_ids}
+    if any(not m.clip_ids for m in matches):
+        wanted |= _longest(motion_feature)
+    clips: dict[str, ClipFeatures] = {}
+    for key in motion_feature.keys:
+        here = wanted & set(motion_feature.stamp(key).clips)
+        if not here:
+            continue
+        beats = tables.by_clip(motion_beat.read(key, clip_ids=here))
+        for clip, rows in tables.by_clip(motion_feature.read(key, clip_ids=here)).items():
+            clips[clip] = ClipFeatures(
+                np.asarray(tables.to_numbers(rows["rhythm"]), np.float32),
+                tables.to_numbers(rows["peak_effort_rad_per_s"]).astype(np.float64),
+                tables.to_numbers(beats[clip]["time_s"]).astype(np.float64) if clip in beats else np.zeros(0),
+            )
+    music = music_feature.read(song_id)
+    return LoadedMatches(
+        segments,
+        np.asarray(tables.to_numbers(music["rhythm"]), np.float32),
+        tables.to_numbers(music["intensity"]).astype(np.float64),
+        matches,
+        clips,
+    )
+
+
+def _longest(motion_feature: Stored, *, most: int = 20) -> set[str]:
+    sizes = {c: r.num_rows for key in motion_feature.keys for c, r in tables.by_clip(motion_feature.read(key)).items()}
+    names = sorted(sizes)
+    return {names[i] for i in longest_first(np.array([sizes[n] for n in names], np.int64), most=most)}
+
+
+def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, settings: Settings) -> Danced:
+    """Choose one piece a segment: by rhythm, intensity, pace, joints and repetition."""
+    if not any(clip.duration_s > 0 for clip in found.clips.values()):
+        raise dg.Failure("no clip can be danced: none is longer than one frame; add clips", allow_retries=False)
+    spans, pieces = pieces_of(found, beat_s, settings.match_path)
+    clip_ids = sorted({p.clip_id for ps in pieces for p in ps})
+    index = {clip: i for i, clip in enumerate(clip_ids)}
+    candidates = [
+        path.Candidates(
+            np.array([index[p.clip_id] for p in ps], np.int64),
+            np.array([p.start_s for p in ps]),
+            np.array([p.end_s for p in ps]),
+            np.array([p.cost for p in ps]),
+        )
+        for ps in pieces
+    ]
+    limits, joints = joints_of(pieces, spans, found.clips, canonical_pose, settings)
+    chosen = path.choose(candidates, joints, repetition_weight=settings.match_path.repetition_weight)
+    steps, span_of = path.to_choreography(
+        candidates,
+        chosen,
+        start_s=spans[:-1],
+        end_s=spans[1:],
+        beat_s=beat_s,
+        clip_ids=tuple(clip_ids),
+        blend_s=settings.dance.blend_s,
+    )
+    width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.dance.blend_s)
+    steps = Choreography(
+        steps.clip_id,
+        steps.song_start_s,
+        steps.song_end_s,
+        steps.clip_start_s,
+        steps.clip_end_s,
+        steps.has_seam,
+        width,
+    )
+    used = [ps[c] for ps, c in zip(pieces, chosen.choice, strict=True)]
+    is_first = np.append(True, np.diff(span_of) > 0)
+    by_span = {
+        "transition_cost": chosen.seam_cost,
+        "warp_cost": np.array([p.warp_cost for p in used]),
+        "match_cost": np.array([p.match_cost for p in used]),
+        "intensity_cost": np.array([p.intensity_cost for p in used]),
+        "repetition_cost": chosen.repetition_cost,
+    }
+    costs = {name: np.where(is_first, values[span_of], 0.0) for name, values in by_span.items()}
+    metadata = {
+        "cost": chosen.total_cost,
+        "seams": int(chosen.has_seam.sum()),
+        "seams_beyond_thresholds": int((~chosen.is_connected).sum()),
+        "threshold_pose_rad": limits.pose_rad,
+        "threshold_speed_rad_per_s": limits.speed_rad_per_s,
+        "share_of_pairs_that_connect": _share([j.is_connected for j in joints]),
+        "clips": len(set(steps.clip_id)),
+        "starts_snapped_to_clip_beats": sum(p.is_snapped for p in used),
+        "spans_without_a_match": sum(p.rank_number == 0 for p in used),
+        "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
+        "choice": dg.MetadataValue.md(matching_plots.chosen(spans, used, chosen)),
+    }
+    return Danced(steps, costs, metadata)
+
+
+def _share(masks: Sequence[Any]) -> float:
+    n = sum(m.size for m in masks)
+    return float(sum(int(m.sum()) for m in masks) / n) if n else 1.0
+
+
+def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) -> tuple[Float, list[list[Piece]]]:
+    """Pieces every span of the song may be danced with: (S + 1,) edges of the spans, and S lists.
+
+    A segment without a match becomes as many spans as the longest clip needs, each with the longest clips' beginnings.
+    """
+    song_edges = intensity.quantile_edges(found.intensity)
+    clip_edges = intensity.quantile_edges(
+        np.concatenate([clip.peak_effort for _, clip in sorted(found.clips.items())] or [np.zeros(0)])
+    )
+    parts = matching_tables.segment_rhythms(found.segments, found.rhythm)
+    edges: list[float] = [0.0]
+    every: list[list[Piece]] = []
+    for i, matches in enumerate(found.matches):
+        start_s, end_s = float(found.segments.start_s[i]), float(found.segments.end_s[i])
+        if matches.clip_ids:
+            made = [
+                _of_match(found, i, rank, parts[i], beat_s, (song_edges, clip_edges), settings)
+                for rank in range(len(matches.clip_ids))
+            ]
+            every.append(made)
+            edges.append(end_s)
+            continue
+        names = sorted(found.clips)
+        order = longest_first(np.array([len(found.clips[n].rhythm) for n in names], np.int64), most=20)
+        longest_s = found.clips[names[order[0]]].duration_s
+        for a, b in zip(*_pairs(split_span(start_s, end_s, beat_s=beat_s, longest_s=longest_s)), strict=True):
+            every.append(
+                [
+                    Piece(names[n], 0.0, b - a, 0, settings.match_weight, settings.intensity_weight, 0.0)
+                    for n in order
+                    if found.clips[names[n]].duration_s >= b - a - 1e-9
+                ]
+            )
+            edges.append(b)
+    return np.array(edges), every
+
+
+def _pairs(edges: Float) -> tuple[list[float], list[float]]:
+    return edges[:-1].tolist(), edges[1:].tolist()
+
+
+def _of_match(
+    found: LoadedMatches,
+    segment: int,
+    rank: int,
+    part: Rhythm,
+    beat_s: Float,
+    edges: tuple[Float, Float],
+    settings: MatchPathSettings,
+) -> Piece:
+    """Make one match a piece, and price it."""
+    matches, segments = found.matches[segment], found.segments
+    clip = found.clips[matches.clip_ids[rank]]
+    numerator, start = int(matches.numerator[rank]), int(matches.start_frame_index[rank])
+    frame = snap_start(
+        part,
+        clip.rhythm,
+        numerator=numerator,
+        start_frame_index=start,
+        beat_s=clip.beat_s,
+        loss_ratio=settings.snap_loss_ratio,
+    )
+    scale = numerator / SCALE_DENOMINATOR
+    start_s, end_s = float(segments.start_s[segment]), float(segments.end_s[segment])
+    first = int(segments.start_frame_index[segment])
+    # A segment starts between two frames; the clip's time under it moves along by as much.
+    clip_s = max(frame / FEATURE_RATE_HZ + scale * (start_s - first / FEATURE_RATE_HZ), 0.0)
+    clip_end_s = min(clip_s + scale * (end_s - start_s), clip.duration_s)
+    music = found.intensity[first : first + len(part)]
+    motion = motion_under(clip.peak_effort, len(part), numerator=numerator, start=frame)
+    inside = beat_s[(beat_s > start_s + 0.1) & (beat_s < end_s - 0.1)]
+    cut = np.rint((np.concatenate([[start_s], inside, [end_s]]) - start_s) * FEATURE_RATE_HZ).astype(np.int64)
+    agreement = intensity.agreement(
+        intensity.bhattacharyya(intensity.histogram(music, edges[0]), intensity.histogram(motion, edges[1])),
+        intensity.rank_correlation(intensity.beat_means(music, cut), intensity.beat_means(motion, cut)),
+    )
+    warp = (end_s - start_s) / (clip_end_s - clip_s)
+    uneasy = 0.0 if EASY_WARP[0] - 1e-6 <= warp <= EASY_WARP[1] + 1e-6 else UNEASY_COST
+    return Piece(
+        matches.clip_ids[rank],
+        clip_s,
+        clip_end_s,
+        rank + 1,
+        settings.match_weight * match_cost(matches, rank),
+        settings.intensity_weight * (1.0 - agreement),
+        WARP_COST * abs(float(np.log(warp))) / float(np.log(1.1)) + uneasy,
+        frame != start,
+    )
+
+
+def match_cost(matches: StoredMatches, rank: int) -> float:
+    """Cost of a match, 0 to 1: half for its place among the candidates, half for what lacks to an equal rhythm."""
+    place = rank / max(len(matches.clip_ids) - 1, 1)
+    return 0.5 * place + 0.5 * (1.0 - float(matches.mutual_ratio[rank]))
+
+
+def joints_of(
+    pieces: Sequence[Sequence[Piece]],
+    spans: Float,
+    clips: Mapping[str, ClipFeatures],
+    canonical_pose: Stored,
+    settings: Settings,
+) -> tuple[connect.Thresholds, list[path.Joint]]:
+    """Compare the ends of all pieces with the starts of the next, and say which connect."""
+    n_links = len(CANONICAL.joints) - 1
+    weight = link_weights(CANONICAL.offset_xyz_m, CANONICAL.parent)
+    half_s = settings.dance.blend_s / 2
+    ends = [_no_poses(len(ps), n_links) for ps in pieces]
+    starts = [_no_poses(len(ps), n_links) for ps in pieces]
+    lacking_end, lacking_start = ([np.zeros(len(ps)) for ps in pieces] for _ in range(2))
+    of_clip: dict[str, list[tuple[int, int]]] = {}
+    for i, ps in enumerate(pieces):
+        for j, piece in enumerate(ps):
+            of_clip.setdefault(piece.clip_id, []).append((i, j))
+    changes = []
+    for clip_id, direction, (first_s, last_s) in _directions(canonical_pose, set(of_clip)):
+        changes.append(connect.own_changes(direction, weight, apart_s=APART_S))
+        here = of_clip[clip_id]
+        own = [pieces[i][j] for i, j in here]
+        pace = np.array(
+            [(p.end_s - p.start_s) / (spans[i + 1] - spans[i]) for (i, _), p in zip(here, own, strict=True)]
+        )
+        at_start = connect.poses_at(direction, np.array([p.start_s for p in own]), pace=pace)
+        at_end = connect.poses_at(direction, np.array([p.end_s for p in own]), pace=pace)
+        for n, (i, j) in enumerate(here):
+            starts[i].direction[j], starts[i].velocity[j] = at_start.direction[n], at_start.velocity[n]
+            ends[i].direction[j], ends[i].velocity[j] = at_end.direction[n], at_end.velocity[n]
+            room = half_s * pace[n]
+            if room > 0:
+                lacking_start[i][j] = max(first_s + room - own[n].start_s, 0.0) / room
+                lacking_end[i][j] = max(own[n].end_s + room - last_s, 0.0) / room
+    limits = connect.calibrate(changes)
+    joints = []
+    for i in range(len(pieces) - 1):
+        pose, speed = connect.differences(ends[i], starts[i + 1], weight)
+        unlike = (pose / limits.pose_rad + speed / limits.speed_rad_per_s) / 2
+        # A blend that reaches past a clip's end stands still there.
+        stands = MARGIN_COST * (lacking_end[i][:, None] + lacking_start[i + 1][None])
+        joints.append(
+            path.Joint(settings.match_path.seam_weight * unlike + stands, connect.connects(pose, speed, limits))
+        )
+    return limits, joints
+
+
+def _no_poses(n: int, n_links: int) -> connect.JointPoses:
+    return connect.JointPoses(np.zeros((n, n_links, 3)), np.zeros((n, n_links, 3)))
+
+
+def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str, Float, tuple[float, float]]]:
+    """Link directions of the wanted clips at 120 Hz, one clip at a time, and the seconds between which it is usable."""
+    for key in canonical_pose.keys:
+        here = wanted & set(canonical_pose.stamp(key).clips)
+        rows: pa.Table | None = canonical_pose.read(key, clip_ids=here) if here else None
+        for moved in tables.to_canonical_poses(rows) if rows is not None else ():
+            position = at_feature_rate(moved.position_xyz_m, moved.frame_rate_hz)
+            root = at_feature_rate(moved.rotation_wxyz[:, 0], moved.frame_rate_hz)
+            first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
+            usable_s = first / moved.frame_rate_hz, last / moved.frame_rate_hz
+            yield moved.clip_id, link_directions(position, root, CANONICAL.parent), usable_s

@@ -1,0 +1,1 @@
+"""Music-motion matching (S1)."""

@@ -1,0 +1,391 @@
+"""The k best clips of every segment on an OpenCL device: the twin of :func:`kernels.matching.score.reference_matches`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from kernels.matching.plan import PLANS, Plan, bytes_a_frame
+from kernels.matching.score import (
+    SCALES,
+    Match,
+    check_query,
+    check_series,
+    merge_matches,
+    music_sum,
+    numerators,
+    ranked,
+    ratios,
+    reference_matches,
+    start_count,
+    sums_of_candidates,
+)
+from kernels.opencl.device import pick_device
+from kernels.opencl.match_finalists import candidates, finalists
+from kernels.opencl.match_program import Program
+from kernels.opencl.match_stages import Stages, wants_safe
+from kernels.opencl.match_tables import Tables
+from kernels.opencl.match_tuning import pick_plan
+
+MEMORY_BYTES = 2**31
+_LONGEST = 2**23
+_CANDIDATES = 2**14
+
+Series = NDArray[np.floating]
+
+
+class ClipIndex:
+    """A catalogue prepared for many songs; made by :meth:`Matcher.index`.
+
+    Holds the clips in host memory, and their tables in device memory where the matcher's budget allows.
+    """
+
+    def __init__(self, chunks: Sequence[Chunk], *, fiftieths: tuple[int, ...], is_resident: bool) -> None:
+        self.chunks = tuple(chunks)
+        self.fiftieths = fiftieths
+        self.is_resident = is_resident
+
+    def __len__(self) -> int:
+        return sum(len(chunk.clips) for chunk in self.chunks)
+
+    @property
+    def device_bytes(self) -> int:
+        """Device memory held between searches."""
+        return sum(chunk.tables.n_bytes for chunk in self.chunks if chunk.tables is not None)
+
+
+class Chunk:
+    """Neighbouring clips of a catalogue that are searched together.
+
+    Parameters
+    ----------
+    first : int, index in the catalogue of the first
+    clips : sequence of (T,) float
+    """
+
+    def __init__(self, first: int, clips: Sequence[Series]) -> None:
+        self.first = first
+        self.clips = tuple(clips)
+        self.tables: Tables | None = None
+        silent = [not clip.any() for clip in self.clips]
+        self.live = np.flatnonzero(~np.array(silent, bool))
+        self.silent = np.flatnonzero(silent)
+        self._flat: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
+
+    def sounding(self) -> list[Series]:
+        """Clips that are not silent throughout: those the device sees."""
+        return [self.clips[index] for index in self.live]
+
+    def flat(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """All sounding clips one after another, and where each begins."""
+        if self._flat is None:
+            clips = self.sounding()
+            starts = np.cumsum([0, *(len(clip) for clip in clips)])[:-1]
+            self._flat = np.concatenate(clips).astype(np.float64), starts.astype(np.int64)
+        return self._flat
+
+    def halves(self) -> tuple[Chunk, Chunk]:
+        """Split, with nothing of it on the device."""
+        half = len(self.clips) // 2
+        return Chunk(self.first, self.clips[:half]), Chunk(self.first + half, self.clips[half:])
+
+
+class Matcher:
+    """The search on one device.
+
+    Parameters
+    ----------
+    context : cl.Context of one device, or None for the device :func:`kernels.opencl.device.pick_device` picks
+    memory_bytes : int
+        Device memory for clips and their tables; more clips are taken chunk by chunk.
+    plan : Plan or None
+        The way of searching; None: timed on a sample of the data. No way changes the answer.
+    by_level : bool or None
+        Refine level by level rather than depth first; None: not on a CPU.
+    program : Program or None
+        Compiled kernels to share; None: the context's own.
+
+    Raises
+    ------
+    kernels.opencl.device.NoDeviceError
+        If no device is given and there is none.
+    ValueError
+        If the memory is not > 0, or the context has not exactly one device.
+
+    Notes
+    -----
+    Kernels work in float32 with a margin above their rounding; whatever may be among the best is scored again in
+    float64, in the reference's order. So every answer has the reference's bits. See docs/matching.md.
+    """
+
+    def __init__(
+        self,
+        context: cl.Context | None = None,
+        *,
+        memory_bytes: int = MEMORY_BYTES,
+        plan: Plan | None = None,
+        by_level: bool | None = None,
+        program: Program | None = None,
+    ) -> None:
+        if memory_bytes <= 0:
+            raise ValueError(f"memory_bytes: want > 0, got {memory_bytes}")
+        self.program = program or Program(context or cl.Context([pick_device()]))
+        self.memory_bytes = memory_bytes
+        self.plan = plan
+        self.by_level = not self.program.is_cpu if by_level is None else by_level
+        self.last_plan: Plan | None = plan
+
+    @property
+    def name(self) -> str:
+        """Device and driver, for metadata."""
+        return self.program.name
+
+    def index(self, clips: Iterable[Series], *, scales: Sequence[float] = SCALES) -> ClipIndex:
+        """Prepare a catalogue for many songs.
+
+        Parameters
+        ----------
+        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys
+        scales : rising multiples of 1/50
+
+        Returns
+        -------
+        ClipIndex
+            Its tables are built by the first search and stay on the device if all fit into the memory allowed; else
+            they are built anew, chunk by chunk, by every search.
+
+        Raises
+        ------
+        ValueError
+            If a clip is not (F,), not finite or negative; or the scales are not as wanted.
+        """
+        fiftieths = numerators(scales)
+        chunks = list(self._chunks(clips, fiftieths, n_segments=0))
+        return ClipIndex(chunks, fiftieths=fiftieths, is_resident=len(chunks) <= 1)
+
+    def matches(
+        self,
+        segments: Sequence[Series],
+        clips: Iterable[Series] | ClipIndex,
+        *,
+        k: int,
+        scales: Sequence[float] = SCALES,
+        floors: Sequence[float] | None = None,
+    ) -> list[list[Match]]:
+        """Find the k best clips of every segment.
+
+        Parameters
+        ----------
+        segments : sequence of (L,) float, L >= 1, finite, >= 0
+        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys; or their index
+            An iterable is read once, a chunk at a time.
+        k : int, >= 1
+        scales : rising multiples of 1/50
+        floors : sequence of S float, or None
+            Scores that k clips elsewhere are known to reach, as when many workers share a song: worse ones may be left
+            out here. What :func:`kernels.matching.score.merge_matches` makes of all parts stays the same.
+
+        Returns
+        -------
+        list, one a segment, of lists of Match
+            As :func:`kernels.matching.score.reference_matches`, to the bit.
+
+        Raises
+        ------
+        ValueError
+            As the reference; or if an index was made for other scales, or there is not one floor a segment.
+        MemoryError
+            If the device cannot hold even one clip and its tables.
+        """
+        fiftieths = numerators(scales)
+        segments = [np.asarray(segment) for segment in segments]
+        check_query(segments, k=k)
+        if floors is not None and len(floors) != len(segments):
+            raise ValueError(f"floors: want one a segment, {len(segments)}, got {len(floors)}")
+        if isinstance(clips, ClipIndex) and clips.fiftieths != fiftieths:
+            raise ValueError(f"clips: want an index for the scales {tuple(scales)}, got one for others; make it anew")
+        found: list[list[Match]] = [[] for _ in segments]
+        if not segments:
+            return found
+        song = _Song(segments, k=k, fiftieths=fiftieths)
+        given = np.full(len(segments), -1.0) if floors is None else np.asarray(floors, np.float64)
+        chunks = (
+            clips.chunks if isinstance(clips, ClipIndex) else self._chunks(clips, fiftieths, n_segments=len(segments))
+        )
+        self.last_plan = self.plan
+        for chunk in chunks:
+            is_kept = isinstance(clips, ClipIndex) and clips.is_resident
+            reached = [matches[-1].score if len(matches) == k else -1.0 for matches in found]
+            part = self._search(song, chunk, np.maximum(given, reached), is_kept=is_kept)
+            found = merge_matches([found, part], k=k)
+        return found
+
+    def _chunks(self, clips: Iterable[Series], fiftieths: tuple[int, ...], *, n_segments: int) -> Iterator[Chunk]:
+        """Cut a catalogue into chunks whose tables fit, for the plan that needs most."""
+        plans = [self.plan] if self.plan else list(PLANS)
+        a_frame = max(bytes_a_frame(plan, fiftieths) for plan in plans)
+        most = min(self.memory_bytes, 2**31 * 4)
+        # one table is one buffer, and a buffer has a limit of its own
+        frames_most = min(self.program.device.max_mem_alloc_size // a_frame, 2**30)
+        waiting: list[Series] = []
+        first, n_bytes, n_frames = 0, 0, 0
+        for index, clip in enumerate(clips):
+            clip = np.asarray(clip)
+            try:
+                check_series([clip], "clip")
+            except ValueError as error:
+                raise ValueError(str(error).replace("clip 0", f"clip {index}", 1)) from None
+            if len(clip) > _LONGEST:
+                raise ValueError(f"clip {index}: want at most {_LONGEST} frames, got {len(clip)}; cut it")
+            stride = len(clip) + 24
+            if waiting and (n_bytes + stride * a_frame + 8 * n_segments > most or n_frames + stride > frames_most):
+                yield Chunk(first, waiting)
+                first, waiting, n_bytes, n_frames = index, [], 0, 0
+            waiting.append(clip)
+            n_bytes += stride * a_frame + 8 * n_segments
+            n_frames += stride
+        if waiting:
+            yield Chunk(first, waiting)
+
+    def _search(self, song: _Song, chunk: Chunk, floor: NDArray[np.float64], *, is_kept: bool) -> list[list[Match]]:
+        """Search one chunk; if the device's memory does not suffice, its halves."""
+        try:
+            found = self._search_device(song, chunk, floor, is_kept=is_kept)
+        except (cl.MemoryError, cl.RuntimeError, MemoryError) as error:
+            chunk.tables = None
+            if len(chunk.clips) < 2:
+                raise MemoryError(
+                    f"device: want memory for one clip of {len(chunk.clips[0])} frames and its tables, got {error}; "
+                    "cut the clip or choose another device"
+                ) from error
+            parts = [self._search(song, half, floor, is_kept=False) for half in chunk.halves()]
+            return merge_matches(parts, k=song.k)
+        for index in range(len(song.segments)):
+            silent = range(len(chunk.clips)) if song.is_silent[index] else chunk.silent.tolist()
+            if silent and floor[index] <= 0:
+                found[index] += song.silences(index, chunk, silent)
+        return [ranked(matches, k=song.k) for matches in found]
+
+    def _search_device(
+        self, song: _Song, chunk: Chunk, floor: NDArray[np.float64], *, is_kept: bool
+    ) -> list[list[Match]]:
+        """Find the matches of segments and clips that are not silent."""
+        found: list[list[Match]] = [[] for _ in song.segments]
+        if not len(chunk.live) or song.is_silent.all():
+            return found
+        tables = chunk.tables or Tables(self.program, chunk.sounding(), numerators=song.fiftieths)
+        kinds = [
+            None if quiet else (wants_safe(tables, top),) for quiet, top in zip(song.is_silent, song.top, strict=True)
+        ]
+        for is_safe in (False, True):
+            chosen = np.array([index for index in song.order if kinds[index] == (is_safe,)], np.int64)
+            if not len(chosen):
+                continue
+            plan = self.last_plan or pick_plan(
+                self.program,
+                song.padded[chosen],
+                n_frames=song.n_frames[chosen],
+                clips=chunk.sounding(),
+                numerators=song.fiftieths,
+                k=song.k,
+                by_level=self.by_level,
+            )
+            self.last_plan = plan
+            tables.build(plan)
+            longest = int(song.n_frames[chosen].max())
+            stages = Stages(
+                tables,
+                song.padded[chosen, :longest],
+                n_frames=song.n_frames[chosen],
+                plan=plan,
+                is_safe=is_safe,
+                by_level=self.by_level,
+            )
+            self._finish(song, chunk, stages, chosen, floor, found)
+        for index, kind in enumerate(kinds):
+            if kind == (None,):
+                scales = [p / 50 for p in song.fiftieths]
+                matches, *_ = reference_matches([song.segments[index]], chunk.sounding(), k=song.k, scales=scales)
+                found[index] = [
+                    replace(m, segment_index=index, clip_index=int(chunk.live[m.clip_index]) + chunk.first)
+                    for m in matches
+                ]
+        if is_kept:
+            chunk.tables = tables
+        return found
+
+    def _finish(
+        self,
+        song: _Song,
+        chunk: Chunk,
+        stages: Stages,
+        chosen: NDArray[np.int64],
+        floor: NDArray[np.float64],
+        found: list[list[Match]],
+    ) -> None:
+        """Score what may be among the best in float64."""
+        scaled = np.ldexp(floor[chosen], -stages.tables.exponent).astype(np.float32)
+        lowest = np.where(floor[chosen] < 0, np.float32(-1), np.nextafter(scaled, np.float32(-np.inf)))
+        pairs, score = finalists(stages, k=song.k, floor=lowest)
+        frames, starts = chunk.flat()
+        for some, emitted in candidates(stages, pairs, score):
+            segment, clip = some[emitted.pair].astype(np.int64).T
+            numerator = np.array(song.fiftieths, np.int64)[emitted.scale]
+            exact = [
+                sums_of_candidates(
+                    song.padded,
+                    frames,
+                    n_frames=song.n_frames,
+                    segment=chosen[segment[part]],
+                    first=starts[clip[part]] + emitted.start[part],
+                    numerator=numerator[part],
+                )
+                for part in (slice(at, at + _CANDIDATES) for at in range(0, len(segment), _CANDIDATES))
+            ]
+            if not exact:
+                continue
+            scores, motion = (np.concatenate(column) for column in zip(*exact, strict=True))
+            order = np.lexsort((emitted.start, emitted.scale, -scores, emitted.pair))
+            best = order[np.append(True, np.diff(emitted.pair[order]) > 0)]
+            for i in best.tolist():
+                index = int(chosen[segment[i]])
+                found[index].append(
+                    Match(
+                        index,
+                        0,
+                        int(chunk.live[clip[i]]) + chunk.first,
+                        int(emitted.scale[i]),
+                        int(emitted.start[i]),
+                        float(scores[i]),
+                        *ratios(float(scores[i]), song.music_sum[index], float(motion[i])),
+                    )
+                )
+
+
+class _Song:
+    """Segments laid out once for all chunks."""
+
+    def __init__(self, segments: list[Series], *, k: int, fiftieths: tuple[int, ...]) -> None:
+        self.segments, self.k, self.fiftieths = segments, k, fiftieths
+        self.n_frames = np.array([len(segment) for segment in segments], np.int64)
+        self.order = np.argsort(self.n_frames, kind="stable")
+        self.padded = np.zeros((len(segments), int(self.n_frames.max())))
+        for index, segment in enumerate(segments):
+            self.padded[index, : len(segment)] = segment
+        self.top = self.padded.max(1)
+        self.is_silent = self.top == 0
+        self.music_sum = [music_sum(segment) for segment in segments]
+
+    def silences(self, index: int, chunk: Chunk, clips: Iterable[int]) -> list[Match]:
+        """The first k of some clips that a segment fits into, where all scores are 0."""
+        matches: list[Match] = []
+        for clip in clips:
+            if start_count(len(self.segments[index]), len(chunk.clips[clip]), self.fiftieths[0]):
+                matches.append(Match(index, 0, clip + chunk.first, 0, 0, 0.0, 0.0, 0.0))
+                if len(matches) == self.k:
+                    break
+        return matches

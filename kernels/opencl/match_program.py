@@ -1,0 +1,115 @@
+"""The compiled kernels of the matching engine on one device, and starting them."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+_INDEX = ("match_index.cl",)
+_SEARCH = ("match_score.cl", "match_refine.cl")
+
+
+class Program:
+    """Kernels for one device; vector width, segments taken together and work-group sizes follow the device.
+
+    Parameters
+    ----------
+    context : cl.Context of one device
+    lanes : 4, 8 or 16, or None for twice the device's preferred width
+    together : int or None
+        Segments one work-item takes together; None: 12 on a CPU, where few work-items with much to do are best, else 4.
+
+    Raises
+    ------
+    ValueError
+        If the context has not exactly one device.
+
+    Notes
+    -----
+    None of the choices changes an answer. Two variants of the scores are built when first needed: four terms to a
+    division, and one to a division (`is_safe`), for features whose sizes lie far apart.
+    """
+
+    def __init__(self, context: cl.Context, *, lanes: int | None = None, together: int | None = None) -> None:
+        if len(context.devices) != 1:
+            raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
+        self.context = context
+        self.device = context.devices[0]
+        self.is_cpu = bool(self.device.type & cl.device_type.CPU)
+        most = max(2 * self.device.preferred_vector_width_float, 4)
+        self.lanes = lanes or max(width for width in (4, 8, 16) if width <= most)
+        self.together = together or (12 if self.is_cpu else 4)
+        self.queue = cl.CommandQueue(context)
+        self._built: dict[tuple[str, bool], cl.Program] = {}
+
+    @property
+    def name(self) -> str:
+        """Device and driver, for metadata: "AMD EPYC (Portable Computing Language 3.0)"."""
+        device = self.device
+        return f"{device.name.strip()} ({device.platform.name.strip()} {device.driver_version.strip()})"
+
+    def run(
+        self, name: str, size: tuple[int, ...], *arguments: object, is_safe: bool = False, light: bool = False
+    ) -> None:
+        """Start a kernel; the queue keeps the order.
+
+        Parameters
+        ----------
+        name : str
+        size : work-items wanted in each dimension; kernels leave those beyond alone
+        arguments : int (passed as int32) or cl.Buffer
+        is_safe : bool, the variant with one term to a division
+        light : bool
+            Work-items with little to do: on a CPU they go in groups too.
+        """
+        if min(size) == 0:
+            return
+        kernel = cl.Kernel(self._program(name, is_safe), name)
+        kernel.set_args(*(np.int32(value) if isinstance(value, int) else value for value in arguments))
+        limit = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.device)
+        width = 64 if light or not self.is_cpu else 1
+        width = min(width, limit, self.device.max_work_item_sizes[0], 1 << max(size[0] - 1, 0).bit_length())
+        group = (width, *(1 for _ in size[1:]))
+        whole = (-(-size[0] // width) * width, *size[1:])
+        cl.enqueue_nd_range_kernel(self.queue, kernel, whole, group)
+
+    def buffer(self, content: NDArray[np.generic]) -> cl.Buffer:
+        """Copy an array to the device; one unused number where it is empty, for a buffer may not be."""
+        array = np.ascontiguousarray(content) if content.size else np.zeros(1, content.dtype)
+        return cl.Buffer(self.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
+
+    def room(self, n_bytes: int) -> cl.Buffer:
+        """Make an unset buffer of at least 16 bytes.
+
+        Raises
+        ------
+        cl.MemoryError
+            If the device has not the memory, or allows no buffer of this size.
+        """
+        if n_bytes > self.device.max_mem_alloc_size:
+            raise cl.MemoryError(f"buffer: want at most {self.device.max_mem_alloc_size} bytes, got {n_bytes}")
+        return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size=max(n_bytes, 16))
+
+    def read(self, buffer: cl.Buffer, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray[np.generic]:
+        """Wait for the queue and copy the front of a buffer to the host."""
+        out = np.zeros(shape, dtype)
+        if out.size:
+            cl.enqueue_copy(self.queue, out, buffer)
+        return out
+
+    def write(self, buffer: cl.Buffer, content: NDArray[np.generic], *, offset_bytes: int = 0) -> None:
+        """Copy an array into a buffer."""
+        cl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(content), dst_offset=offset_bytes)
+
+    def _program(self, name: str, is_safe: bool) -> cl.Program:
+        files = _INDEX if name in ("sum_frames", "sum_blocks", "largest_of_8") else _SEARCH
+        key = (files[0], is_safe and files is _SEARCH)
+        if key not in self._built:
+            folder = resources.files("kernels.opencl")
+            source = "\n".join(folder.joinpath(file).read_text(encoding="utf-8") for file in files)
+            options = ["-cl-mad-enable", "-D", f"LANES={self.lanes}", "-D", f"WIDTH={self.together}"]
+            self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[1] else []))
+        return self._built[key]

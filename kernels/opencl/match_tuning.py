@@ -1,0 +1,84 @@
+"""Picking a plan by trying some on a sample."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.matching.plan import BRUTE, PLANS, Plan
+from kernels.opencl.match_finalists import finalists
+from kernels.opencl.match_program import Program
+from kernels.opencl.match_stages import Stages, wants_safe
+from kernels.opencl.match_tables import Tables
+
+_SEGMENTS = 8
+_CLIPS = 48
+_SPARSE = 0.5
+
+
+def worth_trying(segments: NDArray[np.float64], n_frames: NDArray[np.int64]) -> list[Plan]:
+    """Plans that may be the best for segments: sparse ones only where there is silence to leave out.
+
+    Parameters
+    ----------
+    segments : (S, L) float64, filled up with zeros
+    n_frames : (S,) int64
+
+    Returns
+    -------
+    list of Plan, never empty
+    """
+    share = np.count_nonzero(segments) / n_frames.sum()
+    if share < _SPARSE:
+        return [plan for plan in PLANS if plan != BRUTE]
+    return [plan for plan in PLANS if not plan.is_sparse and plan != BRUTE]
+
+
+def pick_plan(
+    program: Program,
+    segments: NDArray[np.float64],
+    *,
+    n_frames: NDArray[np.int64],
+    clips: Sequence[NDArray[np.floating]],
+    numerators: tuple[int, ...],
+    k: int,
+    by_level: bool,
+) -> Plan:
+    """Time the plans on a few segments and clips.
+
+    Parameters
+    ----------
+    program : Program
+    segments : (S, L) float64, S >= 1
+        Filled up with zeros.
+    n_frames : (S,) int64
+    clips : sequence of (T,) float, at least one
+    numerators : the scales times 50
+    k : int
+    by_level : bool
+
+    Returns
+    -------
+    Plan
+        The fastest. Only the time of a search depends on it, never the answer.
+    """
+    plans = worth_trying(segments, n_frames)
+    some = np.unique(np.linspace(0, len(segments) - 1, _SEGMENTS).astype(int))
+    few = [clips[i] for i in np.unique(np.linspace(0, len(clips) - 1, _CLIPS).astype(int))]
+    tables = Tables(program, few, numerators=numerators)
+    is_safe = any(wants_safe(tables, float(segments[i].max())) is not False for i in some)
+    k_sample = max(round(k * len(few) / len(clips)), 1)
+    spent = []
+    for plan in plans:
+        tables.build(plan)
+        stages = Stages(tables, segments[some], n_frames=n_frames[some], plan=plan, is_safe=is_safe, by_level=by_level)
+        times = []
+        for _ in range(2):
+            start = time.perf_counter()
+            finalists(stages, k=k_sample, floor=np.full(len(some), -1, np.float32))
+            times.append(time.perf_counter() - start)
+        spent.append(min(times))
+    return plans[int(np.argmin(spent))]

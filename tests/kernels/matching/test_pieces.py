@@ -1,0 +1,60 @@
+"""Starts brought to beats, spans cut to what clips can fill."""
+
+import numpy as np
+import pytest
+
+from kernels.matching.pieces import longest_first, motion_under, snap_start, split_span
+from kernels.motion.features import bumps
+
+SEGMENT = bumps(240, np.array([0.0, 60, 120, 180]), np.ones(4), width_s=0.05)
+
+
+def clip(first):
+    return bumps(480, first + 60.0 * np.arange(5), np.ones(5), width_s=0.05)
+
+
+def snap(clip_values, start, beat_s, loss, numerator=50):
+    return snap_start(
+        SEGMENT, clip_values, numerator=numerator, start_frame_index=start, beat_s=np.array(beat_s), loss_ratio=loss
+    )
+
+
+def test_reading_a_clip_at_a_scale():
+    np.testing.assert_allclose(motion_under(np.arange(10.0), 4, numerator=45, start=2), [2, 2.9, 3.8, 4.7])
+    np.testing.assert_allclose(motion_under(np.arange(3.0), 4, numerator=50, start=1), [1, 2, 2, 2])
+
+
+def test_a_near_beat_is_taken_where_it_costs_little():
+    assert snap(clip(62), 60, [62 / 120], 0.05) == 62
+    assert snap(clip(60), 60, [61 / 120], 0.05) == 61
+
+
+def test_a_beat_that_costs_too_much_is_not():
+    assert snap(clip(60), 60, [68 / 120], 0.05) == 60
+    assert snap(clip(60), 60, [68 / 120], 1.0) == 68
+    assert snap(clip(60), 60, [61 / 120], 0.0) == 60
+
+
+def test_far_beats_no_beats_and_the_ends_of_the_clip():
+    assert snap(clip(60), 60, [90 / 120], 1.0) == 60
+    assert snap(clip(60), 60, [], 1.0) == 60
+    assert snap(clip(60)[:300], 60, [64 / 120], 1.0) == 60
+
+
+def test_spans_are_cut_at_beats_and_evenly_without():
+    np.testing.assert_allclose(split_span(0.0, 4.0, beat_s=np.arange(0, 5, 0.5), longest_s=1.2), [0, 1, 2, 3, 4])
+    np.testing.assert_allclose(split_span(0.0, 4.0, beat_s=np.zeros(0), longest_s=1.5), [0, 4 / 3, 8 / 3, 4])
+    np.testing.assert_allclose(split_span(0.0, 4.0, beat_s=np.array([2.0]), longest_s=8.0), [0, 4])
+
+
+@pytest.mark.parametrize("longest_s", [0.05, 0.3, 0.7, 2.0])
+def test_no_part_is_too_long(longest_s):
+    edges = split_span(1.0, 7.7, beat_s=np.arange(0, 9, 0.41), longest_s=longest_s)
+    assert edges[0] == 1.0
+    assert edges[-1] == 7.7
+    assert (np.diff(edges) > 0).all()
+    assert (np.diff(edges) <= longest_s + 1e-9).all()
+
+
+def test_the_longest_clips_come_first_and_equal_ones_in_order():
+    np.testing.assert_array_equal(longest_first(np.array([3, 9, 9, 1]), most=3), [1, 2, 0])

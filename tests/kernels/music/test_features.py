@@ -1,0 +1,79 @@
+"""Rhythm and intensity of songs made up with known beats and levels."""
+
+import numpy as np
+import pytest
+
+from kernels.motion.features import FEATURE_RATE_HZ
+from kernels.music.features import gather, music_features, onset_strength
+from kernels.synthetic.music import drum_machine_song
+
+RATE_HZ = 22050
+
+
+@pytest.fixture(scope="module")
+def song():
+    made = drum_machine_song(tempo_bpm=120, n_bars=3)
+    return made.render(sample_rate_hz=RATE_HZ), made.beats.time_s
+
+
+def test_rhythm_peaks_at_beats(song):
+    samples, beat_s = song
+    found = music_features(samples, RATE_HZ, beat_s=beat_s, duration_s=len(samples) / RATE_HZ)
+    at = np.rint(beat_s * FEATURE_RATE_HZ).astype(int)
+    assert (found.rhythm[at] > 0.1).all()
+    between = ((at[:-1] + at[1:]) / 2).astype(int)
+    assert not found.rhythm[between].any()
+    assert np.percentile(found.rhythm, 99) == pytest.approx(1)
+    assert np.percentile(found.intensity, 99) == pytest.approx(1)
+    assert min(found.rhythm.min(), found.intensity.min()) >= 0
+    assert len(found.rhythm) == len(found.intensity) == int(len(samples) / RATE_HZ * 120 + 1e-6) + 1
+
+
+def test_impulses_are_one_value_a_beat(song):
+    samples, beat_s = song
+    found = music_features(samples, RATE_HZ, beat_s=beat_s, duration_s=len(samples) / RATE_HZ, width_s=0.0)
+    assert np.count_nonzero(found.rhythm) == len(beat_s)
+
+
+def test_a_quieter_half_has_less_intensity():
+    tone = np.sin(2 * np.pi * 1000 * np.arange(4 * RATE_HZ) / RATE_HZ)
+    tone[2 * RATE_HZ :] *= 0.1
+    found = music_features(tone, RATE_HZ, beat_s=np.zeros(0), duration_s=4.0)
+    np.testing.assert_allclose(found.intensity[200] - found.intensity[400], 20 / 40, atol=0.01)
+
+
+def test_how_loud_a_song_is_recorded_does_not_matter(song):
+    samples, beat_s = song
+    how = {"beat_s": beat_s, "duration_s": len(samples) / RATE_HZ}
+    a, b = (music_features(samples * gain, RATE_HZ, **how) for gain in (1.0, 0.25))
+    np.testing.assert_allclose(a.rhythm, b.rhythm, atol=0.02)
+    np.testing.assert_allclose(a.intensity, b.intensity, atol=1e-4)
+
+
+def test_beats_in_silence_have_no_rhythm(song):
+    samples, beat_s = song
+    quiet = samples.copy()
+    quiet[int(2.9 * RATE_HZ) :] = 0
+    found = music_features(quiet, RATE_HZ, beat_s=beat_s, duration_s=len(quiet) / RATE_HZ)
+    assert not found.rhythm[int(3.3 * 120) :].any()
+    assert found.rhythm[: (2 * 120)].any()
+
+
+def test_silence_and_nothing():
+    found = music_features(np.zeros(RATE_HZ), RATE_HZ, beat_s=np.array([0.1, 0.6]), duration_s=1.0)
+    assert not found.rhythm.any()
+    assert not found.intensity.any()
+    none = music_features(np.zeros(0), RATE_HZ, beat_s=np.zeros(0), duration_s=0.0)
+    assert len(none.rhythm) == len(none.time_s) == 0
+
+
+def test_onsets_are_gathered_near_beats_only():
+    onset = np.zeros(300)
+    onset[[100, 155]] = 5.0, 3.0
+    np.testing.assert_array_equal(gather(onset, np.array([1.03, 1.5, 2.5, 9.0])), [5, 3, 0, 0])
+    np.testing.assert_array_equal(gather(np.zeros(0), np.array([1.0])), [0])
+
+
+def test_a_sample_that_is_no_number_is_refused():
+    with pytest.raises(ValueError, match="not finite"):
+        onset_strength(np.array([0.0, np.nan] * 4000), RATE_HZ)
