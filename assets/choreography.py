@@ -1,23 +1,19 @@
 """What is danced when: the methods, each writing the same table."""
 
-from dataclasses import replace
-
 import dagster as dg
 import numpy as np
 import pyarrow as pa
 
-from assets import plots, tables
+from assets import tables
 from assets.declare import table_asset
+from assets.direction import Song as SongBeats
+from assets.graph_path import by_graph, catalogue, direction_of, read_clips
 from assets.lineage import Part, Progress, Stored, repeatable
-from assets.partitions import DANCE, EVERY, lake_key
-from assets.sequence import Danced, by_matching, load_matches
-from assets.sources import Studio
-from kernels.assembly.timing import blend_widths, cover, trim
-from kernels.graph.costs import PathCosts
-from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
-from kernels.types import Choreography, Float, Int, MotionGraph
+from assets.partitions import DANCE, EVERY, base_method, lake_key
+from assets.sequence import by_matching, load_matches
+from assets.sources import Studio, request_version
+from kernels.assembly.timing import cover
 from schemas.choreography import CHOREOGRAPHY
-from schemas.settings import DanceSettings, PathSettings, Settings
 
 _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 
@@ -27,11 +23,13 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
     group="dance",
     code_version="2",
     settings="path match_path dance",
+    sources="request",
     partitions=DANCE,
-    ins={name: _EVERY_CLIP for name in ("canonical_pose", "motion_feature", "motion_beat")},
+    ins={name: _EVERY_CLIP for name in ("clip", "canonical_pose", "motion_feature", "motion_beat")},
     methods={
         "motion_graph_node": "graph",
         "motion_graph_edge": "graph",
+        "clip": "graph",
         "[path]": "graph",
         "match": "matching",
         "music_segment": "matching",
@@ -46,6 +44,7 @@ def choreography(
     context: dg.AssetExecutionContext,
     motion_graph_node: Stored,
     motion_graph_edge: Stored,
+    clip: Stored,
     match: Stored,
     music_segment: Stored,
     music_feature: Stored,
@@ -68,72 +67,25 @@ def choreography(
     duration_s = float(max(song["duration_s"].to_pylist()))
     beat_s, _ = cover(grid.time_s, duration_s)
     settings = studio.settings()
-    if method == "graph":
+    asked = direction_of(studio, key)
+    if base_method(method) == "graph":
         graph, clip_ids = tables.to_motion_graph(motion_graph_node.read(), motion_graph_edge.read())
-        danced = by_graph(graph, clip_ids, beat_s, duration_s, settings)
+        clips = read_clips([clip.read(session) for session in clip.keys])
+        known = catalogue(graph, clip_ids, clips, asked.allow)
+        danced = by_graph(known, SongBeats(beat_s, grid, duration_s), settings, asked)
+    elif asked.wishes or asked.allow:
+        raise dg.Failure(
+            f"{song_id}: pins and licences are kept by the graph method alone; dance it with --method graph",
+            allow_retries=False,
+        )
     else:
         found = load_matches(song_id, match, music_segment, music_feature, motion_feature, motion_beat)
         with repeatable():
             danced = by_matching(found, canonical_pose, beat_s, settings)
     progress.step()
     costs = {name: danced.costs.get(name, np.zeros(len(danced.steps.clip_id))) for name in COST_COLUMNS}
-    return Part(key, tables.from_choreography(song_id, method, danced.steps, costs), metadata=danced.metadata)
+    rows = tables.from_choreography(song_id, method, danced.steps, costs, danced.pin_ids)
+    return Part(key, rows, request_version(studio, key), metadata=danced.metadata)
 
 
 COST_COLUMNS = tuple(name for name in CHOREOGRAPHY.arrow.names if name.endswith("_cost"))
-
-
-def by_graph(
-    graph: MotionGraph, clip_ids: tuple[str, ...], beat_s: Float, duration_s: float, settings: Settings
-) -> Danced:
-    """Find the best way through the motion graph for a song."""
-    path, begins = search(graph, beat_s, settings.path)
-    steps, kept = chosen_steps(path, graph, beat_s, clip_ids, duration_s, settings.dance)
-    costs = {
-        "transition_cost": path.transition_cost[kept],
-        "warp_cost": path.warp_cost[kept],
-        "stride_cost": path.stride_cost[kept],
-        "beat_cost": path.beat_cost[kept],
-        "repetition_cost": path.repetition_cost[kept],
-    }
-    metadata = {
-        "cost": path.total_cost,
-        "seams": int(steps.has_seam.sum()),
-        "clips": len(set(steps.clip_id)),
-        "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
-        "begins_at": begins,
-        "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
-    }
-    return Danced(steps, costs, metadata)
-
-
-def search(graph: MotionGraph, beat_s: Float, settings: PathSettings) -> tuple[Path, str]:
-    """Find the path from the first beat of a clip, or where none leads to the end, from any beat."""
-    usual = PathCosts()
-    costs = replace(
-        usual,
-        transition=usual.transition * settings.transition_weight,
-        warp=usual.warp * settings.warp_weight,
-        usage=usual.usage * settings.repetition_weight,
-        missed_beat=usual.missed_beat * settings.beat_weight,
-        jump_back=usual.jump_back * settings.repetition_weight,
-    )
-    try:
-        return find_path(graph, beat_s, costs=costs), "the first beat of a clip"
-    except InfeasiblePathError as error:
-        if error.reason == "no_nodes":
-            raise dg.Failure(f"no clip can be danced: {error}", allow_retries=False) from error
-    try:
-        return find_path(graph, beat_s, costs=costs, starts="any"), "any beat"
-    except InfeasiblePathError as error:
-        raise dg.Failure(str(error), allow_retries=False) from error
-
-
-def chosen_steps(
-    path: Path, graph: MotionGraph, beat_s: Float, clip_ids: tuple[str, ...], duration_s: float, settings: DanceSettings
-) -> tuple[Choreography, Int]:
-    """Cut the path to the song and give its seams their blends; the steps, and which of the path's they are."""
-    steps = to_choreography(path, graph, beat_s=beat_s, clip_ids=clip_ids, blend_s=settings.blend_s)
-    steps, kept = trim(steps, duration_s)
-    width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.blend_s)
-    return replace(steps, blend_s=width), kept

@@ -7,7 +7,10 @@ from schemas import settings
 SESSION = dg.DynamicPartitionsDefinition(name="session")
 SONG = dg.DynamicPartitionsDefinition(name="song")
 METHODS = settings.METHODS
-METHOD = dg.StaticPartitionsDefinition(list(METHODS))
+MOST_ALTERNATIVES = 5
+ALTERNATIVES = tuple(f"graph_{number}" for number in range(2, MOST_ALTERNATIVES + 1))
+"""The graph method's second to fifth dance of a song, each unlike those before it."""
+METHOD = dg.StaticPartitionsDefinition([*METHODS, *ALTERNATIVES])
 DANCE = dg.MultiPartitionsDefinition({"song": SONG, "method": METHOD})
 EVERY = dg.AllPartitionMapping()
 
@@ -15,6 +18,16 @@ EVERY = dg.AllPartitionMapping()
 def dance_key(song: str, method: str) -> str:
     """Partition key of a song danced with a method."""
     return str(dg.MultiPartitionKey({"song": song, "method": method}))
+
+
+def base_method(method: str) -> str:
+    """Find the method an alternative is one of."""
+    return method.partition("_")[0]
+
+
+def alternative_number(method: str) -> int:
+    """Which dance of its method: 1 for the best, 2 and on for alternatives."""
+    return int(method.partition("_")[2] or 1)
 
 
 def song_and_method(key: str) -> tuple[str, str]:

@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from assets import matching_plots, matching_tables, plots, tables
+from assets.danced import Danced
 from assets.lineage import Stored
 from assets.matching_tables import Rhythm, StoredMatches
 from kernels.assembly.timing import blend_widths
@@ -27,15 +28,6 @@ APART_S = 0.1
 """How far apart moments of one clip are that pass for neighbours: a quarter of the usual blend."""
 
 WARP_COST, UNEASY_COST, MARGIN_COST = 0.1, 3.0, 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Danced:
-    """Steps a method chose, their costs by column (0 for the columns of other methods), and what to show of them."""
-
-    steps: Choreography
-    costs: Mapping[str, Float]
-    metadata: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,9 +98,11 @@ class Request:
     Parameters
     ----------
     frame_rate_hz : frames a second of the stage; 0 for the setting
+    pins : as on the command line; beside those of the brief
     """
 
     frame_rate_hz: float = 0.0
+    pins: tuple[str, ...] = ()
 
 
 class Studio(Protocol):
@@ -292,17 +294,19 @@ def read_brief(studio: Studio, song: Song) -> Brief:
 
 
 def brief_version(studio: Studio, songs: Iterable[Song]) -> str:
-    """Version of what the briefs of a song say, the beats file they name included."""
+    """Version of what the briefs of a song say of its beats, the beats file they name included."""
     said = []
     for song in songs:
         if not song.brief:
             continue
         place = studio.file(song.brief)
-        said.append(tree.sha256(place))
         try:
-            beats = settings.read_brief(place).beats.file
+            asked = settings.read_brief(place).beats
         except FormatError:
+            said.append(tree.sha256(place))
             continue
+        said.append(fingerprint(asdict(asked)))
+        beats = asked.file
         beats_place = place.parent / beats
         if beats and beats_place.is_file():
             said.append(tree.sha256(beats_place))
@@ -314,6 +318,17 @@ def request_of(studio: Studio, key: str) -> Request:
     return studio.requests().get(key, Request())
 
 
-def request_version(studio: Studio, key: str) -> str:
-    """Version of what was asked of a dance."""
-    return fingerprint(asdict(request_of(studio, key)))
+def request_version(studio: Studio, key: str, sources: Sources | None = None) -> str:
+    """Version of what was asked of a dance: by the command, and by the brief of its song, of known sources or now's."""
+    brief = brief_of(studio, key.split("|")[0], sources)
+    directed = {"pin": [pin.text for pin in brief.pin], "pins": brief.pins, "allow": sorted(brief.allow)}
+    return fingerprint([asdict(request_of(studio, key)), directed])
+
+
+def brief_of(studio: Studio, song: str, sources: Sources | None = None) -> Brief:
+    """Read the brief of a song by its key; every default where it has none, or one that cannot be read."""
+    songs = [s for s in (sources or studio.sources()).songs_by_key().get(song, ()) if s.brief and not s.problem]
+    try:
+        return studio.brief(songs[0]) if songs else Brief()
+    except FormatError:  # its song is refused for it
+        return Brief()

@@ -346,8 +346,10 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
 # Dances ------------------------------------------------------------------------------------------------------------
 
 
-def from_choreography(song_id: str, method: str, steps: Choreography, costs: Mapping[str, Float]) -> pa.Table:
-    """Pack a choreography, S rows; ``costs`` by column name."""
+def from_choreography(
+    song_id: str, method: str, steps: Choreography, costs: Mapping[str, Float], pin_ids: Sequence[str | None] = ()
+) -> pa.Table:
+    """Pack a choreography, S rows; ``costs`` by column name, ``pin_ids`` by step, or empty for no pins."""
     s = len(steps.clip_id)
     columns = {
         "song_id": pa.array([song_id] * s, pa.string()),
@@ -361,7 +363,7 @@ def from_choreography(song_id: str, method: str, steps: Choreography, costs: Map
         "has_seam": pa.array(steps.has_seam),
         "blend_s": pa.array(steps.blend_s, pa.float32()),
         "warp_ratio": pa.array(steps.warp_ratio, pa.float32()),
-        "pin_id": pa.nulls(s, pa.string()),
+        "pin_id": pa.array(pin_ids or [None] * s, pa.string()),
         **{name: pa.array(cost, pa.float32()) for name, cost in costs.items()},
     }
     return CHOREOGRAPHY.check(pa.table([columns[c] for c in CHOREOGRAPHY.arrow.names], schema=CHOREOGRAPHY.arrow))

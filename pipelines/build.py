@@ -6,10 +6,11 @@ Dagster runs on the studio's own instance, so the UI shows them like any other.
 
 import fcntl
 import os
-from collections.abc import Callable, Collection, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import dagster as dg
 from dagster_shared.error import SerializableErrorInfo
@@ -51,12 +52,25 @@ class Batch:
         return dagster_key(self.keys[0]) if len(self.keys) == 1 and self.keys[0] else None
 
 
+@dataclass(frozen=True)
+class Trouble:
+    """Why a run failed: a sentence, and what the asset said of it for machines."""
+
+    sentence: str
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+
 @dataclass
 class Report:
     """What a build did."""
 
     ran: list[Batch] = field(default_factory=list)
-    failed: list[str] = field(default_factory=list)
+    troubles: list[Trouble] = field(default_factory=list)
+
+    @property
+    def failed(self) -> list[str]:
+        """What failed, one sentence each."""
+        return [trouble.sentence for trouble in self.troubles]
 
     @property
     def is_done(self) -> bool:
@@ -154,8 +168,8 @@ def _neighbours(keys: list[str], kind: str, instance: dg.DagsterInstance) -> lis
     return runs
 
 
-def execute(batch: Batch, definitions: dg.Definitions, instance: dg.DagsterInstance) -> list[str]:
-    """Run a batch in this process; what failed, one sentence each."""
+def execute(batch: Batch, definitions: dg.Definitions, instance: dg.DagsterInstance) -> list[Trouble]:
+    """Run a batch in this process; what failed."""
     job = definitions.resolve_job_def(batch.job)
     result = job.execute_in_process(
         instance=instance,
@@ -167,10 +181,21 @@ def execute(batch: Batch, definitions: dg.Definitions, instance: dg.DagsterInsta
     )
     if result.success:
         return []
-    causes = [_cause(event.step_key or batch.job, error) for event in result.all_events for error in _errors(event)]
-    causes = list(dict.fromkeys(causes)) or [f"{batch.job}: the run failed and gave no reason; see it in 'odori ui'"]
+    causes = {
+        _cause(event.step_key or batch.job, error): _said(event)
+        for event in result.all_events
+        for error in _errors(event)
+    } or {f"{batch.job}: the run failed and gave no reason; see it in 'odori ui'": {}}
     of = f"[{', '.join(batch.keys)}] " if any(batch.keys) else ""
-    return [f"{of}{cause}" for cause in causes]
+    return [Trouble(f"{of}{cause}", facts) for cause, facts in causes.items()]
+
+
+def _said(event: dg.DagsterEvent) -> dict[str, Any]:
+    """Find what a failing asset said for machines."""
+    if not event.is_step_failure or event.step_failure_data.user_failure_data is None:
+        return {}
+    metadata = event.step_failure_data.user_failure_data.metadata
+    return {name: getattr(value, "data", getattr(value, "value", None)) for name, value in metadata.items()}
 
 
 def _errors(event: dg.DagsterEvent) -> list[SerializableErrorInfo]:
@@ -219,10 +244,10 @@ def bring_up_to_date(
                 for single in batch.singles():
                     tried.add(single)
                     failed = execute(single, definitions, instance)
-                    report.failed += failed
+                    report.troubles += failed
                     given_up |= unmade(single, state) if failed else set()
             else:
-                report.failed += failed
+                report.troubles += failed
                 given_up |= unmade(batch, state) if failed else set()
         state.forget()
 

@@ -80,23 +80,39 @@ def dance(
         float | None, typer.Option("--fps", help="Frames a second of the stage.", min=1.0, max=240.0)
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Also copy the stage here: a .usdz or .usdc file.")] = None,
+    pin: Annotated[
+        list[str] | None,
+        typer.Option("--pin", metavar="PLACE=WISH", help="What to dance when; kept, or refused with the reason."),
+    ] = None,
+    alternatives: Annotated[
+        int, typer.Option("--alternatives", help="How many different dances of each song to make.")
+    ] = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Dance a song: a USD stage with the music in it.
 
     Examples: odori dance waltz.mp3 · odori dance waltz --method matching · odori dance all ·
-    odori dance waltz --fps 60 --out /show/waltz.usdz
+    odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY ·
+    odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3
     """
-    _dance(studio, songs, method, fps, out, as_json)
+    _dance(studio, songs, method, fps, out, as_json, pins=pin or (), alternatives=alternatives)
 
 
 def _dance(
-    studio: Path | None, songs: list[str], method: str | None, fps: float | None, out: Path | None, as_json: bool
+    studio: Path | None,
+    songs: list[str],
+    method: str | None,
+    fps: float | None,
+    out: Path | None,
+    as_json: bool,
+    **more: Any,  # noqa: ANN401 - what else commands.dance takes
 ) -> None:
     from pipelines import commands
 
     with _Trouble(as_json):
-        result = commands.dance(_folder(studio), songs, method=method, frame_rate_hz=fps, out=out, progress=_progress())
+        result = commands.dance(
+            _folder(studio), songs, method=method, frame_rate_hz=fps, out=out, progress=_progress(), **more
+        )
         _finish(result, as_json)
 
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import polars as pl
 from sqlalchemy.exc import DBAPIError
 
 from assets.formats import usd_package
 from assets.formats.errors import FormatError
 from assets.lineage import Progress, content_version
 from assets.motion import beat_settings
-from assets.partitions import METHODS
+from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES
 from assets.sources import Request, Song
 from pipelines import build as building
 from pipelines.collection import freshness
@@ -25,6 +26,7 @@ from pipelines.resources import StudioError, StudioFolder
 from pipelines.web import existing
 from schemas.motion import CANONICAL_POSE
 from schemas.music import SONG
+from schemas.pins import parse_pin
 
 DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
 LONGEST_LIST = 40
@@ -143,6 +145,8 @@ def dance(
     frame_rate_hz: float | None,
     out: Path | None,
     progress: Callable[[], Any],
+    pins: Sequence[str] = (),
+    alternatives: int = 1,
 ) -> Outcome:
     """Dance songs, building first what they need and nothing else; by their briefs' methods where none is given."""
     studio = existing(root)
@@ -150,14 +154,18 @@ def dance(
         raise StudioError(f"--method: want one of {', '.join(METHODS)}, got {method!r}")
     if out is not None:
         _check_out(out)
+    pins = _pin_texts(pins)
+    if not 1 <= alternatives <= MOST_ALTERNATIVES:
+        raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
     work = _Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
-    methods = {song.key: method or _briefed_method(studio, song) for song in songs}
-    keys = {f"{song}|{chosen}" for song, chosen in methods.items()}
+    methods = {song.key: _ways(method or _briefed_method(studio, song), alternatives) for song in songs}
+    keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
+    before = studio.requests()
     for key in sorted(keys):
-        studio.remember(key, Request(frame_rate_hz or 0.0))
+        studio.remember(key, Request(frame_rate_hz or 0.0, pins))
     names = {song.key for song in songs}
     report = work.run(
         building.GROUPS,
@@ -167,20 +175,37 @@ def dance(
     state = freshness(studio)
     refused = {f["key"]: f["reason"] for f in _songs(state, studio) if f["state"] == "refused"}
     made, troubles = [], []
-    for song in songs:
-        key = f"{song.key}|{methods[song.key]}"
-        found = studio.lake.stamp("usd_animation", key)
+    for song, way in [(one, way) for one in songs for way in methods[one.key]]:
+        key = f"{song.key}|{way}"
         if refused.get(song.key):
             troubles.append(f"refused: {song.path}: {refused[song.key]}")
-        elif found is None or state.state("usd_animation", key).state != "fresh":
+        elif not state.is_danced(key):
             troubles += [f"failed: {f}" for f in report.failed] or [f"failed: {song.path}"]
+            studio.remember(key, before.get(key))  # what cannot be is not asked for again every night
         else:
-            made.append(_dance_facts(studio, song.key, methods[song.key]))
+            made.append(_dance_facts(studio, song.key, way))
     if out is not None and made:
         _copy(made[0], out)
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
-    facts = _dance_json(made, troubles, len(songs))
+    facts = _dance_json(made, troubles, len(keys))
+    if not made:
+        facts |= next((dict(t.facts) for t in report.troubles if "conflict" in t.facts), {})
     return Outcome(status, facts, "\n".join(_dance_report(d) for d in made), list(dict.fromkeys(troubles)))
+
+
+def _pin_texts(pins: Sequence[str]) -> tuple[str, ...]:
+    """Check pins of the command line; StudioError says what a pin looks like."""
+    try:
+        return tuple(dict.fromkeys(parse_pin(text).text for text in pins))
+    except ValueError as error:
+        raise StudioError(f"--pin: {error}") from error
+
+
+def _ways(method: str, alternatives: int) -> tuple[str, ...]:
+    """Name the dances to make of a method: itself, and its alternatives."""
+    if alternatives > 1 and method != "graph":
+        raise StudioError(f"--alternatives: want the method graph, which has them, got {method}")
+    return (method, *ALTERNATIVES[: alternatives - 1])
 
 
 def _briefed_method(studio: StudioFolder, song: Song) -> str:
@@ -207,8 +232,34 @@ def _dance_facts(studio: StudioFolder, song: str, method: str) -> dict[str, Any]
         "usdz": str(folder / f"{method}.usdz"),
         "quality": report["quality"],
         "not_as_wanted": sorted(n for n, m in report["wanted"].items() if m["is_passed"] is False),
-        "pins": [],
+        "pins": _pin_facts(studio, f"{song}|{method}"),
     }
+
+
+def _pin_facts(studio: StudioFolder, key: str) -> list[dict[str, Any]]:
+    """Tell for each pin when it is danced, by which clips, and whether it is kept."""
+    steps = pl.DataFrame(studio.lake.table("choreography", key)).filter(pl.col("pin_id").is_not_null())
+    if not len(steps):
+        return []
+    sessions = studio.lake.keys("clip")
+    clips = {r["clip_id"]: r for s in sessions for r in studio.lake.table("clip", s).to_pylist()}
+    facts = []
+    for pin, rows in steps.group_by("pin_id", maintain_order=True):
+        danced = list(dict.fromkeys(rows["clip_id"].to_list()))
+        facts.append(
+            {
+                "pin": pin[0],
+                "from_s": rows["song_start_s"].min(),
+                "to_s": rows["song_end_s"].max(),
+                "clips": danced,
+                "is_kept": all(parse_pin(str(pin[0])).is_kept_by(**_named(clips[clip])) for clip in danced),
+            }
+        )
+    return facts
+
+
+def _named(clip: Mapping[str, Any]) -> dict[str, str]:
+    return {"clip_id": str(clip["clip_id"]), "label": str(clip["label"]), "style": str(clip["style"])}
 
 
 def _dance_report(facts: dict[str, Any]) -> str:
@@ -218,6 +269,11 @@ def _dance_report(facts: dict[str, Any]) -> str:
         f"  {q['clip_count']:.0f} clips, {q['seam_count']:.0f} seams; beats at most {q['beat_lag_ms']:.1f} ms off; "
         f"warp {q['warp_least_ratio']:.2f} to {q['warp_most_ratio']:.2f}",
         f"  on the beat to an independent eye: F {q['beat_f_ratio']:.2f}, p {q['beat_p_probability']:.3f}",
+    ]
+    lines += [
+        f"  pin {p['pin']}: {'kept' if p['is_kept'] else 'not kept'}, {', '.join(p['clips'])} "
+        f"from {p['from_s']:.2f} to {p['to_s']:.2f} s"
+        for p in facts["pins"]
     ]
     if facts["not_as_wanted"]:
         lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")

@@ -16,7 +16,7 @@ import dagster as dg
 from assets import sources as source_kinds
 from assets.declare import METHODS_KEY, SETTINGS_KEY, SOURCES_KEY
 from assets.lineage import Stamp, version_of
-from assets.partitions import METHODS
+from assets.partitions import ALTERNATIVES, METHODS, base_method
 from assets.sources import Sources
 from pipelines.lake import Lake
 from pipelines.resources import StudioError, StudioFolder
@@ -47,7 +47,8 @@ class Node:
 
     def needs(self, name: str, key: str) -> bool:
         """Whether a partition of this asset is made from an input, or from a section of settings in brackets."""
-        return self.kind != "dance" or self.methods.get(name, key.split("|")[-1]) == key.split("|")[-1]
+        method = base_method(key.split("|")[-1])
+        return self.kind != "dance" or self.methods.get(name, method) == method
 
     def inputs_of(self, key: str) -> list[str]:
         """List the inputs that a partition is made from."""
@@ -196,7 +197,7 @@ class Freshness:
             brief = source_kinds.brief_version(self._studio, songs)
             return version_of(source_kinds.song_version(songs), brief)
         if kind == "request":
-            return source_kinds.request_version(self._studio, key)
+            return source_kinds.request_version(self._studio, key, self.sources)
         return ""
 
     def inputs(self, asset: str, key: str) -> dict[str, str] | None:
@@ -257,6 +258,10 @@ class Freshness:
                 return Finding(asset, key, "stale", f"{', '.join(lost)} is not there any more")
         return Finding(asset, key, "fresh")
 
+    def is_danced(self, key: str) -> bool:
+        """Whether all that a dance consists of is as it was asked for."""
+        return all(self.state(n.name, key).state == "fresh" for n in self.assets.values() if n.kind == "dance")
+
     def findings(
         self, groups: Iterable[str] | None = None, *, given_up: Collection[tuple[str, str]] = ()
     ) -> list[Finding]:
@@ -288,6 +293,6 @@ class Freshness:
                 found += [
                     (node.name, k)
                     for k in self._lake.keys(node.name)
-                    if k.split("|")[0] not in songs or k.split("|")[-1] not in METHODS
+                    if k.split("|")[0] not in songs or k.split("|")[-1] not in (*METHODS, *ALTERNATIVES)
                 ]
         return found

@@ -64,13 +64,17 @@ class StudioFolder:
         found = {}
         for path in sorted(folder.glob("*.json")) if folder.is_dir() else []:
             try:
-                found[path.stem] = Request(**json.loads(path.read_text()))
+                said = json.loads(path.read_text())
+                found[path.stem] = Request(**{**said, "pins": tuple(said.get("pins", ()))})
             except (ValueError, TypeError, OSError):
                 continue  # not ours, or of another version: as if nobody had asked
         return found
 
-    def remember(self, key: str, request: Request) -> None:
-        """Keep what was asked of a dance."""
+    def remember(self, key: str, request: Request | None) -> None:
+        """Keep what was asked of a dance; None forgets it."""
+        if request is None:
+            (self.root / "lake" / "request" / f"{key}.json").unlink(missing_ok=True)
+            return
         text = json.dumps(asdict(request), sort_keys=True)
         write_beside(self.root / "lake" / "request" / f"{key}.json", lambda file: file.write(text.encode()))
 

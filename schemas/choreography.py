@@ -32,6 +32,8 @@ CHOREOGRAPHY = Table(
         Column("stride_cost", pa.float32(), "Cost of half- or double-time."),
         Column("beat_cost", pa.float32(), "Cost of music beats on which the body does not visibly stop."),
         Column("repetition_cost", pa.float32(), "Cost of showing again what was shown."),
+        Column("diversity_cost", pa.float32(), "Cost of showing what the better dances of the song show."),
+        Column("wish_cost", pa.float32(), "Cost of soft wishes that are not kept."),
     ),
 )
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, fields
 
-from schemas.settings import check, key
+from schemas.options import check, key
 
 _NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 _SECONDS = re.compile(rf"(?P<at>{_NUMBER})(?:-(?P<until>{_NUMBER}))?")
@@ -78,6 +78,14 @@ class PinWish:
             where = f"{unit}:{first}" + (f"-{last}" if last else "")
         short, name = next((s, n) for s, n in _WISHES.items() if getattr(self, n))
         return f"{where}=" + ("" if short == "label" else f"{short}:") + str(getattr(self, name))
+
+    def is_kept_by(self, *, clip_id: str, label: str, style: str) -> bool:
+        """Whether a clip is what the pin wishes."""
+        if self.clip:
+            return clip_id == self.clip
+        if self.style:
+            return style == self.style
+        return label != self.not_label if self.not_label else label == self.label
 
 
 def parse_pin(text: str) -> PinWish:

@@ -6,36 +6,13 @@ result was made from.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, field
+
+from schemas.options import check, key
+from schemas.pins import PinWish
 
 METHODS = ("graph", "matching")
 """Ways to choose a choreography; the first is the usual one."""
-
-
-def key(
-    default: Any,  # noqa: ANN401 - a default may be of any type
-    meaning: str,
-    *,
-    values: tuple[object, ...] = (),
-    least: float | None = None,
-    most: float | None = None,
-) -> Any:  # noqa: ANN401
-    """Declare one setting: its default, its meaning, and what it may be (a closed list, or bounds)."""
-    allowed = {"values": values, "least": least, "most": most}
-    return field(default=default, metadata={"meaning": meaning, **allowed})
-
-
-def check(record: object) -> None:
-    """Raise ValueError where a value is none that its declaration allows."""
-    for declared in fields(record):  # type: ignore[arg-type]
-        value, allowed = getattr(record, declared.name), declared.metadata
-        least, most = allowed.get("least"), allowed.get("most")
-        if allowed.get("values") and value not in allowed["values"]:
-            raise ValueError(f"{declared.name}: want one of {', '.join(map(str, allowed['values']))}, got {value!r}")
-        if (least is not None and not value >= least) or (most is not None and not value <= most):
-            bounds = f"at least {least:g}" if most is None else f"{least:g} to {most:g}"
-            raise ValueError(f"{declared.name}: want {bounds}, got {value!r}")
 
 
 class _Checked:
@@ -198,4 +175,7 @@ class Brief(_Checked):
     """``songs/NAME.brief.toml``: what a person wants of one song."""
 
     method: str = key(METHODS[0], "How its dance is chosen where the command does not say.", values=METHODS)
+    pin: tuple[PinWish, ...] = key((), "What is to be danced when: one [[pin]] each, a place and a wish.")
+    pins: str = key("hard", "'hard': kept or refused; 'soft': a price where not kept.", values=("hard", "soft"))
+    allow: tuple[str, ...] = key((), "Licences of the clips that may be danced; empty for all.")
     beats: BeatsBrief = field(default_factory=BeatsBrief)

@@ -85,6 +85,10 @@ def _value(value: Any, kind: Any, path: str, full: str) -> Any:  # noqa: ANN401 
         return _record(value, kind, path, full)  # type: ignore[arg-type]
     if get_origin(kind) is tuple:
         item = get_args(kind)[0]
+        if is_dataclass(item):
+            if not isinstance(value, list) or not all(isinstance(v, dict) for v in value):
+                raise FormatError(path, 0, f"{full}: want tables [[{full}]], got {value!r}")
+            return tuple(_record(v, item, path, full) for v in value)  # type: ignore[arg-type]
         if not isinstance(value, list) or not all(isinstance(v, item) for v in value):
             raise FormatError(path, 0, f"{full}: want a list of texts, got {value!r}")
         return tuple(value)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from kernels.matching.blocks import GROUP, Lists, block_sums, bundles, lists, margin, rows
 from kernels.matching.plan import Plan
 from kernels.matching.score import SCALE_DENOMINATOR
-from kernels.opencl.match_program import Program
 from kernels.opencl.match_tables import Tables
 
 SCALE_BITS = 24

@@ -1,0 +1,17 @@
+"""What any method of choosing steps hands over."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from kernels.types import Choreography, Float
+
+
+@dataclass(frozen=True, eq=False)
+class Danced:
+    """Steps a method chose, their costs by column (0 for the columns of other methods), and what to show of them."""
+
+    steps: Choreography
+    costs: Mapping[str, Float]
+    metadata: Mapping[str, Any]
+    pin_ids: Sequence[str | None] = ()

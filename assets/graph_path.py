@@ -1,0 +1,278 @@
+"""A dance through the motion graph, as its director wants it: pins, licences, alternatives."""
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import dagster as dg
+import numpy as np
+import polars as pl
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from assets import direction, licences, plots
+from assets.danced import Danced
+from assets.direction import DirectionError, Nodes
+from assets.direction import Song as SongBeats
+from assets.partitions import alternative_number
+from assets.sources import Studio, brief_of, request_of
+from kernels.assembly.timing import blend_widths, trim
+from kernels.graph.alternatives import find_alternatives, shared_ratio
+from kernels.graph.costs import PathCosts
+from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
+from kernels.graph.pins import Pin, Reach, admitted, find_conflict
+from kernels.types import Choreography, Float, Int, MotionGraph
+from schemas.pins import PinWish, parse_pin
+from schemas.settings import DanceSettings, PathSettings, Settings
+
+SOFT_WISH = 1.0
+"""Price of a beat that a soft wish would have otherwise: the document's, about that of a seam."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """What is asked of one dance.
+
+    Parameters
+    ----------
+    wishes : pins, in the order given
+    is_soft : whether they only cost where they are not kept
+    allow : licences of the clips that may be danced; all where empty
+    alternative : 1 for the best dance, 2 for the best that differs from it, and so on
+    """
+
+    wishes: tuple[PinWish, ...] = ()
+    is_soft: bool = False
+    allow: tuple[str, ...] = ()
+    alternative: int = 1
+
+
+def direction_of(studio: Studio, key: str) -> Direction:
+    """Gather what is asked of a dance: pins of the brief and of the command, licences, which alternative.
+
+    Raises
+    ------
+    dg.Failure
+        If a remembered pin is none.
+    """
+    song, method = key.split("|")
+    brief = brief_of(studio, song)
+    try:
+        wishes = [*brief.pin, *(parse_pin(text) for text in request_of(studio, key).pins)]
+    except ValueError as error:
+        raise dg.Failure(str(error), allow_retries=False) from error
+    return Direction(
+        tuple({wish.text: wish for wish in wishes}.values()),
+        brief.pins == "soft",
+        brief.allow,
+        alternative_number(method),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Catalogue:
+    """The motion graph as a director may use it: clips by index, and what is known of the clip of each node."""
+
+    graph: MotionGraph
+    clip_ids: tuple[str, ...]
+    nodes: Nodes
+    is_allowed: NDArray[np.bool_]
+
+
+def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame, allow: Sequence[str]) -> Catalogue:
+    """Join the graph with what is known of its clips, and take out what licences forbid.
+
+    Parameters
+    ----------
+    graph : MotionGraph of N nodes
+    clip_ids : by clip index
+    clips : rows of the table ``clip``
+    allow : see :class:`Direction`
+
+    Returns
+    -------
+    Catalogue
+        Without the transitions of clips that may not be changed: those are danced whole or not at all.
+    """
+    known = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
+    facts = [known[clip] for clip in clip_ids]
+    of_node = graph.clip_index
+    licence = [str(row["licence"]) for row in facts]
+    is_whole = np.array([licences.terms_of(name).no_derivatives for name in licence] or [False])[of_node]
+    free = ~(is_whole[graph.source] | is_whole[graph.target])
+    nodes = Nodes(*(np.array([str(row[c]) for row in facts] or [""])[of_node] for c in ("clip_id", "label", "style")))
+    is_allowed = np.array([licences.is_allowed(name, allow) for name in licence] or [True])[of_node]
+    free_graph = replace(graph, source=graph.source[free], target=graph.target[free], weight=graph.weight[free])
+    return Catalogue(free_graph, clip_ids, nodes, is_allowed)
+
+
+def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direction) -> Danced:
+    """Find the best way through the motion graph for a song, as it is asked for.
+
+    Raises
+    ------
+    dg.Failure
+        If no dance can be had, or not with these pins; its metadata hold the conflict and the ways out.
+    """
+    graph = known.graph
+    pins = _pins(known, song, asked)
+    mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
+    if not known.is_allowed.any() and len(known.is_allowed):
+        raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
+    costs = path_costs(settings.path)
+    wish_price = None
+    if pins and asked.is_soft:
+        wish_price = np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH)
+    elif pins:
+        refuse_conflict(known, song, pins, asked, costs)
+        mask = mask & admitted(pins, *mask.shape)
+    is_free = bool(mask.all())
+
+    def find(price: Float) -> Path:
+        return search(
+            graph,
+            song.grid_s,
+            costs,
+            admissible=None if is_free else np.ascontiguousarray(mask),
+            stretch_price=price if price.any() else None,
+            interval_price=wish_price,
+        )
+
+    found = find_alternatives(graph, asked.alternative, find=find)
+    path = found[-1]
+    steps, kept = chosen_steps(path, graph, song.grid_s, known.clip_ids, song.duration_s, settings.dance)
+    columns = ("transition", "warp", "stride", "beat", "repetition", "diversity", "wish")
+    return Danced(
+        steps,
+        {f"{name}_cost": getattr(path, f"{name}_cost")[kept] for name in columns},
+        {
+            "cost": path.total_cost,
+            "costs": dg.MetadataValue.json({name: float(getattr(path, f"{name}_cost").sum()) for name in columns}),
+            "seams": int(steps.has_seam.sum()),
+            "clips": len(set(steps.clip_id)),
+            "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
+            "shared_with_the_best": shared_ratio(graph, path, found[0]) if len(found) > 1 else 1.0,
+            "pins": dg.MetadataValue.json(kept_pins(pins, song, path, known)),
+            "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
+        },
+        [pin_of_step(pins, int(k), int(d)) for k, d in zip(path.beat_index[kept], path.beat_span[kept], strict=True)],
+    )
+
+
+def _pins(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
+    try:
+        return [direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
+    except DirectionError as error:
+        facts = {
+            "conflict": dg.MetadataValue.json([str(error).partition(": ")[0]]),
+            "ways_out": dg.MetadataValue.json([]),
+        }
+        raise dg.Failure(str(error), metadata=facts, allow_retries=False) from error
+
+
+def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], asked: Direction, costs: PathCosts) -> None:
+    """Raise dg.Failure where pins cannot be kept, naming the fewest of them that cannot and what would help."""
+    n = len(known.is_allowed)
+    reach = Reach(known.graph, song.grid_s, costs=costs, starts=np.flatnonzero(known.is_allowed))
+    usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
+    everywhere = Pin("licences", 0, reach.n_intervals, known.is_allowed)
+    if not reach.keeps([everywhere]):
+        return  # the search says why there is no dance at all
+    conflict = find_conflict(_Within(reach, everywhere), usable, choices=_choices(known, asked)) if n else None
+    if conflict is None:
+        return
+    told = direction.sentences(conflict, usable, asked.wishes, song, known.nodes)
+    raise dg.Failure(
+        "; ".join(told),
+        metadata={
+            "conflict": dg.MetadataValue.json([asked.wishes[i].text for i in conflict.pin_index]),
+            "why": told[0],
+            "ways_out": dg.MetadataValue.json(
+                [direction.way_out(way, usable, asked.wishes, song) for way in conflict.ways_out]
+            ),
+        },
+        allow_retries=False,
+    )
+
+
+def _choices(known: Catalogue, asked: Direction) -> dict[str, NDArray[np.bool_]]:
+    """Labels to try in place of what is wished, those spelt alike first."""
+    wished = [wish.label for wish in asked.wishes if wish.label]
+    labels = known.nodes.labels()
+
+    def unlike(label: str) -> float:
+        return -max((difflib.SequenceMatcher(None, label, wish).ratio() for wish in wished), default=0.0)
+
+    return {label: labels[label] for label in sorted(labels, key=lambda label: (unlike(label), label))}
+
+
+class _Within(Reach):
+    """Reach with one pin more, that is never up for discussion."""
+
+    def __init__(self, reach: Reach, always: Pin) -> None:
+        self.__dict__.update(reach.__dict__)
+        self._always = always
+
+    def arrivals(self, pins: Sequence[Pin]) -> NDArray[np.bool_]:
+        return super().arrivals([*pins, self._always])
+
+
+def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:
+    """Name of the pin that a step serves: the first of those it touches; None for none."""
+    return next((pin.name for pin in pins if beat < pin.last and beat + span > pin.first), None)
+
+
+def kept_pins(pins: Sequence[Pin], song: SongBeats, path: Path, known: Catalogue) -> list[dict[str, object]]:
+    """Facts of each pin for machines: whether it is kept, from when to when, by which clips."""
+    clip: dict[int, str] = {}
+    node: dict[int, int] = {}
+    for k, d, u in zip(path.beat_index.tolist(), path.beat_span.tolist(), path.source_node.tolist(), strict=True):
+        for interval in range(k, k + d):
+            clip[interval], node[interval] = known.clip_ids[known.graph.clip_index[u]], u
+    facts = direction.kept(pins, song, clip)
+    for pin, fact in zip(pins, facts, strict=True):
+        fact["is_kept"] = bool(all(pin.nodes[node[k]] for k in range(pin.first, pin.last)))
+    return facts
+
+
+def path_costs(settings: PathSettings) -> PathCosts:
+    """Weigh the usual prices as the settings say."""
+    usual = PathCosts()
+    return replace(
+        usual,
+        transition=usual.transition * settings.transition_weight,
+        warp=usual.warp * settings.warp_weight,
+        usage=usual.usage * settings.repetition_weight,
+        missed_beat=usual.missed_beat * settings.beat_weight,
+        jump_back=usual.jump_back * settings.repetition_weight,
+    )
+
+
+def search(graph: MotionGraph, beat_s: Float, costs: PathCosts, **wanted: Any) -> Path:  # noqa: ANN401 - find_path's
+    """Find the path within the hard bounds from the first beat of a clip, else from any beat, else past bounds."""
+    reason: InfeasiblePathError | None = None
+    for starts, strict in (("first", True), ("any", True), ("first", False), ("any", False)):
+        try:
+            return find_path(graph, beat_s, costs=costs, starts=starts, strict=strict, **wanted)  # type: ignore[arg-type]
+        except InfeasiblePathError as error:
+            reason = error
+            if error.reason == "no_nodes":
+                break
+    nothing = reason is not None and reason.reason == "no_nodes"
+    raise dg.Failure(f"no clip can be danced: {reason}" if nothing else str(reason), allow_retries=False)
+
+
+def chosen_steps(
+    path: Path, graph: MotionGraph, beat_s: Float, clip_ids: tuple[str, ...], duration_s: float, settings: DanceSettings
+) -> tuple[Choreography, Int]:
+    """Cut the path to the song and give its seams their blends; the steps, and which of the path's they are."""
+    steps = to_choreography(path, graph, beat_s=beat_s, clip_ids=clip_ids, blend_s=settings.blend_s)
+    steps, kept = trim(steps, duration_s)
+    width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.blend_s)
+    return replace(steps, blend_s=width), kept
+
+
+def read_clips(tables: Sequence[pa.Table]) -> pl.DataFrame:
+    """Gather the rows of all sessions' clips that were read."""
+    return pl.concat([pl.DataFrame(t) for t in tables]).filter(pl.col("state") == "read")

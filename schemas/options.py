@@ -1,0 +1,31 @@
+"""One setting of a file: its default, what it means, what it may be."""
+
+from __future__ import annotations
+
+from dataclasses import field, fields
+from typing import Any
+
+
+def key(
+    default: Any,  # noqa: ANN401 - a default may be of any type
+    meaning: str,
+    *,
+    values: tuple[object, ...] = (),
+    least: float | None = None,
+    most: float | None = None,
+) -> Any:  # noqa: ANN401
+    """Declare one setting: its default, its meaning, and what it may be (a closed list, or bounds)."""
+    allowed = {"values": values, "least": least, "most": most}
+    return field(default=default, metadata={"meaning": meaning, **allowed})
+
+
+def check(record: object) -> None:
+    """Raise ValueError where a value is none that its declaration allows."""
+    for declared in fields(record):  # type: ignore[arg-type]
+        value, allowed = getattr(record, declared.name), declared.metadata
+        least, most = allowed.get("least"), allowed.get("most")
+        if allowed.get("values") and value not in allowed["values"]:
+            raise ValueError(f"{declared.name}: want one of {', '.join(map(str, allowed['values']))}, got {value!r}")
+        if (least is not None and not value >= least) or (most is not None and not value <= most):
+            bounds = f"at least {least:g}" if most is None else f"{least:g} to {most:g}"
+            raise ValueError(f"{declared.name}: want {bounds}, got {value!r}")

@@ -1,0 +1,109 @@
+"""Pins, alternatives and licences, from the command to the finished dance."""
+
+import json
+import shutil
+
+import polars as pl
+import pytest
+
+from pipelines import commands
+from pipelines.resources import NoProgress, StudioError
+
+
+@pytest.fixture
+def dance(studio):
+    """Dance the song of the small studio as it is asked for."""
+
+    def run(**asked):
+        return commands.dance(studio, ["beat"], frame_rate_hz=None, out=None, progress=NoProgress, **asked)
+
+    return run
+
+
+def labels_between(studio, from_s, to_s, method="graph"):
+    lineage = pl.read_parquet(studio / "lake" / "frame_lineage" / f"beat|{method}.parquet", glob=False)
+    clips = pl.concat([pl.read_parquet(p) for p in sorted((studio / "lake" / "clip").glob("*.parquet"))])
+    rows = lineage.filter(pl.col("time_s").is_between(from_s, to_s)).join(clips, on="clip_id", how="left")
+    return set(rows["label"])
+
+
+def test_a_pin_is_kept_frame_by_frame(studio, dance):
+    outcome = dance(pins=["3-5=step", "beat:14=not:step"])
+    assert outcome.status == 0, outcome.troubles
+    assert labels_between(studio, 3.0, 5.0) == {"step"}
+    pins = outcome.facts["pins"]
+    assert {p["pin"] for p in pins} == {"3-5=step", "beat:14=not:step"}
+    assert all(p["is_kept"] for p in pins)
+    assert pins[0]["from_s"] <= 3.0
+    assert pins[0]["to_s"] >= 5.0
+    without = dance()
+    assert without.status == 0
+    assert without.facts["pins"] == []
+
+
+def test_conflicts_name_the_pins_and_ways_out(studio, dance):
+    before = (studio / "dances" / "beat" / "graph.usdz").read_bytes()
+    outcome = dance(pins=["2=setp", "8=step"])
+    assert outcome.status == 2
+    assert outcome.facts["conflict"] == ["2=setp"]
+    assert outcome.facts["ways_out"] == ["2=step in place of 2=setp"]
+    assert "labelled 'setp'" in outcome.facts["why"]
+    assert (studio / "dances" / "beat" / "graph.usdz").read_bytes() == before
+    both = dance(pins=["3=kick", "3=step"])
+    assert both.status == 2
+    assert both.facts["conflict"] == ["3=kick", "3=step"]
+    assert commands.status(studio).status == 0
+    assert dance().status == 0
+
+
+def test_what_is_no_pin_is_refused_at_once(dance):
+    with pytest.raises(StudioError, match="want PLACE=WISH"):
+        dance(pins=["kick"])
+    with pytest.raises(StudioError, match="--alternatives: want 1 to 5"):
+        dance(alternatives=9)
+
+
+def test_pins_and_licences_of_the_brief(studio, dance):
+    brief = studio / "songs" / "beat.brief.toml"
+    pins = '[[pin]]\nat = 4.0\nlabel = "rock"\n[[pin]]\nplace = "end"\nnot_label = "rock"\n'
+    brief.write_text('allow = ["CC0-1.0"]\n' + pins)
+    outcome = dance()
+    assert outcome.status == 0, outcome.troubles
+    pin = outcome.facts["pins"][0]
+    assert labels_between(studio, pin["from_s"] + 0.01, pin["to_s"] - 0.01) == {"rock"}
+    assert [p["pin"] for p in outcome.facts["pins"]] == ["4=rock", "end=not:rock"]
+    brief.write_text('allow = ["MIT"]\n')
+    assert "none has a licence of MIT" in "; ".join(dance().troubles)
+    brief.write_text('pins = "soft"\n[[pin]]\nat = 4.0\nlabel = "no such thing"\n')
+    soft = dance()
+    assert soft.status == 0
+    assert soft.facts["pins"] == [{**soft.facts["pins"][0], "is_kept": False}]
+
+
+def test_clips_that_may_not_be_changed_are_not_blended(studio, dance):
+    sheet = studio / "clips" / "ayame" / "clips.csv"
+    sheet.write_text(sheet.read_text().replace("CC0-1.0", "CC-BY-ND-4.0"))
+    outcome = dance()
+    assert outcome.status == 0, outcome.troubles
+    steps = pl.read_parquet(studio / "lake" / "choreography" / "beat|graph.parquet", glob=False)
+    seams = steps.with_row_index().filter("has_seam")["index"].to_list()
+    around = {steps["clip_id"][k] for i in seams for k in (i - 1, i)}
+    assert not [clip for clip in around if clip.startswith("ayame")]
+
+
+def test_alternatives_differ(studio, dance):
+    outcome = dance(alternatives=2)
+    assert outcome.status == 0, outcome.troubles
+    first, second = outcome.facts["dances"]
+    assert (first["method"], second["method"]) == ("graph", "graph_2")
+    one, other = (
+        pl.read_parquet(studio / "lake" / "frame_lineage" / f"beat|{method}.parquet", glob=False)
+        for method in ("graph", "graph_2")
+    )
+    is_near = (one["clip_time_s"] - other["clip_time_s"]).abs() < 0.1
+    same = (one["clip_id"] == other["clip_id"]) & is_near
+    assert same.mean() < 0.7
+    assert json.loads((studio / "dances" / "beat" / "graph_2.json").read_text())["method"] == "graph_2"
+    shutil.rmtree(studio / "dances")
+    assert dance(alternatives=2).status == 0
+    assert (studio / "dances" / "beat" / "graph_2.usdz").exists()
