@@ -1,6 +1,7 @@
 """What is danced when: the methods, each writing the same table."""
 
 from dataclasses import replace
+from typing import Literal
 
 import dagster as dg
 import numpy as np
@@ -108,7 +109,7 @@ def by_graph(
 
 
 def search(graph: MotionGraph, beat_s: Float, settings: PathSettings) -> tuple[Path, str]:
-    """Find the path from the first beat of a clip, or where none leads to the end, from any beat."""
+    """Find the path from the first beat of a clip, or where none leads to the end at a good pace, from any beat."""
     usual = PathCosts()
     costs = replace(
         usual,
@@ -118,15 +119,17 @@ def search(graph: MotionGraph, beat_s: Float, settings: PathSettings) -> tuple[P
         missed_beat=usual.missed_beat * settings.beat_weight,
         jump_back=usual.jump_back * settings.repetition_weight,
     )
-    try:
-        return find_path(graph, beat_s, costs=costs), "the first beat of a clip"
-    except InfeasiblePathError as error:
-        if error.reason == "no_nodes":
-            raise dg.Failure(f"no clip can be danced: {error}", allow_retries=False) from error
-    try:
-        return find_path(graph, beat_s, costs=costs, starts="any"), "any beat"
-    except InfeasiblePathError as error:
-        raise dg.Failure(str(error), allow_retries=False) from error
+    # Any beat within the hard bounds comes before a first beat played at a pace of last resort.
+    first: tuple[Literal["first", "any"], str] = ("first", "the first beat of a clip")
+    anywhere: tuple[Literal["first", "any"], str] = ("any", "any beat")
+    for strict, (starts, begins) in ((True, first), (True, anywhere), (False, first), (False, anywhere)):
+        try:
+            return find_path(graph, beat_s, costs=costs, starts=starts, strict=strict), begins
+        except InfeasiblePathError as error:
+            if error.reason == "no_nodes":
+                raise dg.Failure(f"no clip can be danced: {error}", allow_retries=False) from error
+            nothing = str(error)
+    raise dg.Failure(nothing, allow_retries=False)
 
 
 def chosen_steps(
