@@ -14,6 +14,7 @@ from pathlib import Path
 import dagster as dg
 from dagster_shared.error import SerializableErrorInfo
 
+from assets.formats import beside
 from assets.partitions import SESSION, SONG, dagster_key, lake_key
 from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP, job_of
@@ -287,7 +288,7 @@ def clear_after_kill(studio: StudioFolder, instance: dg.DagsterInstance) -> int:
 
     Only to be called while the studio is held.
     """
-    removed = studio.lake.sweep()
+    removed: int = studio.lake.sweep() + beside.sweep(studio.dances)
     end_dead_runs(instance)
     return removed
 

@@ -17,6 +17,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
+from assets.formats.beside import written_beside
 from assets.formats.errors import FormatError
 
 LONGEST_S = 1800.0
@@ -228,9 +229,8 @@ def format_wav(audio: Audio) -> bytes:
 
 def write_wav(path: Path, audio: Audio) -> None:
     """Write :func:`format_wav` beside ``path``, then rename: the file is whole or not there."""
-    beside = path.with_name(path.name + ".part")
-    beside.write_bytes(format_wav(audio))
-    beside.replace(path)
+    with written_beside(path) as partial:
+        partial.write_bytes(format_wav(audio))
 
 
 @contextmanager

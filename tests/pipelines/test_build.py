@@ -181,8 +181,11 @@ def test_killed_build_is_finished_by_the_next_one(fresh_studio, built, build):
     process.send_signal(signal.SIGKILL)
     process.wait()
     (fresh_studio / "lake" / "pose" / ".tmp-left").write_bytes(b"half")
+    (fresh_studio / "lake" / ".tmp-left").write_bytes(b"half")
+    (fresh_studio / "dances" / "beat").mkdir(parents=True)
+    (fresh_studio / "dances" / "beat" / ".tmp-left.usdc").write_bytes(b"half")
     assert build(fresh_studio).status == 0
-    assert not list((fresh_studio / "lake").rglob(".tmp-*"))
+    assert not list(fresh_studio.rglob(".tmp-*"))
     assert build(fresh_studio).facts["ran"] == []
     instance = building.open_instance(StudioFolder(fresh_studio))
     assert not instance.get_runs(dg.RunsFilter(statuses=[dg.DagsterRunStatus.STARTED]))
