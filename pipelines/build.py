@@ -20,6 +20,7 @@ from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP, job_of
 from pipelines.lake import why
 from pipelines.resources import StudioError, StudioFolder
+from schemas.keys import check_key
 
 # Stages in order; the groups of one stage run together, clip by clip carried over.
 STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("catalog",), ("dance",))
@@ -72,7 +73,7 @@ def sync_partitions(instance: dg.DagsterInstance, state: Freshness, studio: Stud
         wanted, known = state.keys(kind), instance.get_dynamic_partitions(name)  # type: ignore[arg-type]
         new = [key for key in wanted if key not in set(known)]
         if new:
-            instance.add_dynamic_partitions(name, new)
+            instance.add_dynamic_partitions(name, [check_key(key) for key in new])
         for key in known:
             if key not in set(wanted):
                 instance.delete_dynamic_partition(name, key)

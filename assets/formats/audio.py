@@ -109,26 +109,6 @@ class Audio:
         return len(self.samples) / self.sample_rate_hz
 
 
-def probe(path: Path) -> AudioHeader:
-    """Read the header of a file of music.
-
-    Parameters
-    ----------
-    path : wav, flac, ogg, opus, mp3, aiff …: whatever libsndfile decodes
-
-    Returns
-    -------
-    AudioHeader
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be opened, is no audio that libsndfile knows, or has a rate outside 4 to 768 kHz.
-    """
-    with _opened(path) as sound:
-        return _header(sound, path)
-
-
 def read(path: Path, *, limit_s: float = LONGEST_S) -> Audio:
     """Decode a file of music.
 

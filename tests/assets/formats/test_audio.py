@@ -63,11 +63,11 @@ def test_one_sample(tmp_path):
 
 
 def test_header_agrees_with_what_is_decoded(tmp_path, tone):
-    header = audio.probe(write(tmp_path / "a.flac", tone))
-    assert (header.n_frames, header.n_channels, header.sample_rate_hz) == (2 * RATE, 2, RATE)
-    assert header.format_name == "FLAC/PCM_16"
-    assert header.duration_s == 2.0
-    assert header.remark == ""
+    sound = audio.read(write(tmp_path / "a.flac", tone))
+    assert (*sound.samples.shape, sound.sample_rate_hz) == (2 * RATE, 2, RATE)
+    assert sound.format_name == "FLAC/PCM_16"
+    assert sound.duration_s == 2.0
+    assert sound.remark == ""
 
 
 def test_content_decides_and_the_remark_says_so(tmp_path, tone):
