@@ -69,6 +69,7 @@ class _Reader:
     def __init__(self, studio: Studio, earlier: Earlier, progress: Progress, code: str) -> None:
         self._studio, self._earlier, self._progress = studio, earlier, progress
         self._joints = studio.settings().joints
+        self._max_bytes = int(studio.settings().limits.largest_clip_mb * 1e6)
         self._reading = version_of(code, repr(sorted(self._joints.items())))
 
     def read(self, session: str, clips: tuple[Clip, ...]) -> dict[str, Part]:
@@ -133,7 +134,7 @@ class _Reader:
 
     def _parse(self, source: Clip) -> tuple[dict[str, object], pa.Table, pa.Table]:
         try:
-            take = bvh.to_clip(bvh.read(self._studio.file(source.path)), extra=self._joints)
+            take = bvh.to_clip(bvh.read(self._studio.file(source.path), max_bytes=self._max_bytes), extra=self._joints)
             mapping = take.mapping or map_joints(take.clip.skeleton, self._joints)
         except (FormatError, ValueError, OSError) as error:
             return _refused(_sentence(error)), SKELETON.empty(), POSE.empty()

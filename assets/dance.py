@@ -204,11 +204,11 @@ def usd_animation(
 
 def _sound(song: Mapping[str, Any], studio: Studio) -> Audio:
     """Decode the song; a MIDI file is played by a plain synthesiser, so that there is something to dance to."""
-    place = studio.file(song["path"])
+    place, limit_s = studio.file(song["path"]), studio.settings().limits.longest_song_s
     if song["kind"] == "midi":
-        sound = render_preview(midi.read(place).notes)
+        sound = render_preview(midi.read(place, limit_s=limit_s).notes)
         return Audio(sound.reshape(len(sound), -1), 44100)
-    return audio.read(place)
+    return audio.read(place, limit_s=limit_s)
 
 
 def _provenance(song: Mapping[str, Any], method: str, steps: Choreography, clip: Stored) -> dict[str, Any]:

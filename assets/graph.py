@@ -84,7 +84,10 @@ def motion_graph(
     ids, labels = [b.clip_id for b in beats], [b.label for b in beats]
     node = tables.from_motion_graph_node(graph, ids, index, labels, kept.is_kept)
     edge = tables.from_motion_graph_edge(graph, ids, found.distance)
-    metadata = _metadata(found, losses, settings.prune) | {"labels": dg.MetadataValue.md(_by_label(node))}
+    metadata = _metadata(found, losses, settings.prune) | {
+        "device": getattr(pair_distance, "name", "reference"),
+        "labels": dg.MetadataValue.md(_by_label(node)),
+    }
     yield dg.Output(Part("", node, metadata=metadata), MOTION_GRAPH_NODE.name)
     yield dg.Output(Part("", edge), MOTION_GRAPH_EDGE.name)
     yield dg.AssetCheckResult(

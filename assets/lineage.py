@@ -9,7 +9,7 @@ an upstream rebuild with equal bytes leaves everything after it fresh. Stamps ho
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
@@ -241,12 +241,6 @@ def per_clip(
 def _joined(table: Table, parts: Sequence[pa.Table]) -> pa.Table:
     filled = [p for p in parts if p.num_rows] or list(parts[:1])
     return tables.concat(table, filled)
-
-
-def each_session(upstream: Stored, make: Callable[[str], Part]) -> Iterator[Part]:
-    """Make a part for every session of this run."""
-    for key in upstream.keys:
-        yield make(key)
 
 
 def clip_versions(stored: Stored, key: str, *also: str) -> dict[str, str]:

@@ -82,7 +82,7 @@ def listen(song: Song, studio: Studio, settings: Settings) -> Heard:
     """
     place = studio.file(song.path)
     if song.kind == "midi":
-        read = midi.read(place)
+        read = midi.read(place, limit_s=settings.limits.longest_song_s)
         sound, rate_hz, n_channels = render_preview(read.notes), PREVIEW_RATE_HZ, 0
         duration_s = len(sound) / rate_hz
         analysis = BeatAnalysis(read.beats, _level_of(read.beats))

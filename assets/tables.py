@@ -30,8 +30,6 @@ from schemas.motion import CANONICAL_POSE, MOTION_BEAT, POSE, SKELETON
 from schemas.music import MUSIC_BEAT, MUSIC_LOUDNESS, MUSIC_TEMPO
 from schemas.table import Table
 
-JOINTS_KEY = b"joints"
-
 
 def from_rows(table: Table, rows: Sequence[Mapping[str, Any]]) -> pa.Table:
     """Pack rows of plain values; the table's own columns, in its order."""

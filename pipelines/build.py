@@ -15,11 +15,13 @@ from typing import Any
 import dagster as dg
 from dagster_shared.error import SerializableErrorInfo
 
+from assets.formats import beside
 from assets.partitions import SESSION, SONG, dagster_key, lake_key
 from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP, job_of
 from pipelines.lake import why
 from pipelines.resources import StudioError, StudioFolder
+from schemas.keys import check_key
 
 # Stages in order; the groups of one stage run together, clip by clip carried over.
 STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("catalog",), ("dance",))
@@ -85,7 +87,7 @@ def sync_partitions(instance: dg.DagsterInstance, state: Freshness, studio: Stud
         wanted, known = state.keys(kind), instance.get_dynamic_partitions(name)  # type: ignore[arg-type]
         new = [key for key in wanted if key not in set(known)]
         if new:
-            instance.add_dynamic_partitions(name, new)
+            instance.add_dynamic_partitions(name, [check_key(key) for key in new])
         for key in known:
             if key not in set(wanted):
                 instance.delete_dynamic_partition(name, key)
@@ -312,7 +314,7 @@ def clear_after_kill(studio: StudioFolder, instance: dg.DagsterInstance) -> int:
 
     Only to be called while the studio is held.
     """
-    removed = studio.lake.sweep()
+    removed: int = studio.lake.sweep() + beside.sweep(studio.dances)
     end_dead_runs(instance)
     return removed
 

@@ -17,6 +17,7 @@ from assets.lineage import Progress, content_version
 from assets.motion import beat_settings
 from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES
 from assets.sources import Request, Song
+from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
@@ -88,12 +89,23 @@ class _Session:
 
 def check_settings(studio: StudioFolder) -> None:
     """Refuse settings before anything runs; FormatError naming the key."""
+    settings = studio.settings()
     try:
-        beat_settings(studio.settings().motion_beat)
+        beat_settings(settings.motion_beat)
     except ValueError as error:
-        if isinstance(error, FormatError):
-            raise
         raise FormatError("odori.toml", 0, f"[motion_beat] {error}") from error
+    for source, joint in settings.joints.items():
+        if joint not in JOINTS:
+            near = difflib.get_close_matches(joint, JOINTS, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"they are {', '.join(JOINTS)}"
+            raise FormatError("odori.toml", 0, f"[joints] {source!r}: want a canonical joint, got {joint!r}; {hint}")
+    if settings.opencl.device:
+        from kernels.opencl.device import NoDeviceError, pick_device
+
+        try:
+            pick_device(settings.opencl.device)
+        except NoDeviceError as error:
+            raise FormatError("odori.toml", 0, f"[opencl] {error}") from error
 
 
 def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
@@ -341,6 +353,8 @@ def check(file: Path) -> Outcome:
     """Validate a stage."""
     from assets.formats import usd_check
 
+    if not file.is_file():
+        raise StudioError(f"{file}: want a stage, got no such file; check the path")
     findings = usd_check.check(file)
     errors = [f for f in findings if f.severity == "error"]
     facts = {

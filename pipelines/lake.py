@@ -4,10 +4,7 @@ The only place that writes Parquet. A file is written beside and renamed, so a k
 one. Files of one table and content are byte-equal.
 """
 
-import contextlib
 import errno
-import os
-import uuid
 from collections.abc import Callable, Iterable, Mapping
 from typing import IO, Any
 
@@ -17,12 +14,12 @@ import pyarrow.parquet as pq
 from upath import UPath
 
 from assets import tables
+from assets.formats import beside
 from assets.lineage import Stamp
 from schemas.catalog import TABLES
 
 STAMP_KEY = b"odori"
 WHOLE = "all"
-_MADE_BESIDE = ".tmp-"
 
 
 class LakeError(Exception):
@@ -99,10 +96,7 @@ class Lake:
 
     def sweep(self) -> int:
         """Delete what killed runs left beside; how many files that were."""
-        found = [p for p in self.root.glob("*/*") if p.name.startswith(_MADE_BESIDE)] if self.root.is_dir() else []
-        for path in found:
-            path.unlink(missing_ok=True)
-        return len(found)
+        return beside.sweep(self.root)
 
 
 def _write_parquet(table: pa.Table, file: IO[bytes]) -> None:
@@ -142,16 +136,8 @@ def write_beside(path: Any, write: Callable[[IO[bytes]], object]) -> None:  # no
     LakeError
         If the disk refuses; the old file, if any, stays.
     """
-    beside = path.with_name(f"{_MADE_BESIDE}{uuid.uuid4().hex}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with beside.open("wb") as file:
+        with beside.written_beside(path) as partial, partial.open("wb") as file:
             write(file)
-            file.flush()
-            if hasattr(file, "fileno") and type(path).__module__ != "upath.core":
-                os.fsync(file.fileno())
-        beside.replace(path) if hasattr(beside, "replace") else beside.rename(path)
     except OSError as error:
-        with contextlib.suppress(OSError):
-            beside.unlink(missing_ok=True)
         raise LakeError(f"{path}: cannot be written: {why(error)}") from error

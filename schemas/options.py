@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import field, fields
 from typing import Any
 
@@ -20,10 +21,12 @@ def key(
 
 
 def check(record: object) -> None:
-    """Raise ValueError where a value is none that its declaration allows."""
+    """Raise ValueError where a value is none that its declaration allows; infinity and NaN never are."""
     for declared in fields(record):  # type: ignore[arg-type]
         value, allowed = getattr(record, declared.name), declared.metadata
         least, most = allowed.get("least"), allowed.get("most")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{declared.name}: want a finite number, got {value!r}")
         if allowed.get("values") and value not in allowed["values"]:
             raise ValueError(f"{declared.name}: want one of {', '.join(map(str, allowed['values']))}, got {value!r}")
         if (least is not None and not value >= least) or (most is not None and not value <= most):

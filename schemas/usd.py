@@ -21,7 +21,6 @@ SIDES: tuple[str, ...] = ("middle", "left", "right")
 UP_AXIS = "Y"
 METERS_PER_UNIT = 1.0
 START_TIME_CODE = 0.0
-DEFAULT_FRAME_RATE_HZ = 30.0
 
 # What is packed into a .usdz: the stage comes first, its music lies beside it.
 PACKAGE_ALIGNMENT_BYTES = 64

@@ -1,5 +1,6 @@
 """The house's own rules, kept by machine."""
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
@@ -100,3 +101,28 @@ def test_no_index_host_and_no_path_of_a_machine():
     wrong = re.compile(rf"(https?://[a-z.]*({hosts}))|(/ro{'ot'}/)|(/wo{'rk'}/)")
     found = [str(p.relative_to(REPOSITORY)) for p in TEXTS if wrong.search(p.read_text(errors="replace"))]
     assert found == []
+
+
+# Every public function of these tells its arguments and its errors; the list grows until it is kernels.
+DOCUMENTED = [
+    *(REPOSITORY / "kernels" / "assembly").glob("*.py"),
+    *(REPOSITORY / "kernels" / f"{name}.py" for name in ("graph/costs", "graph/prune", "graph/transitions")),
+    *(REPOSITORY / "kernels" / f"{name}.py" for name in ("skeleton/axes", "skeleton/kinematics", "motion/velocity")),
+]
+
+
+@pytest.mark.parametrize("path", sorted(DOCUMENTED), ids=lambda p: str(p.relative_to(REPOSITORY)))
+def test_public_functions_tell_their_arguments_and_errors(path):
+    missing = []
+    body = ast.parse(path.read_text()).body
+    body += [n for c in body if isinstance(c, ast.ClassDef) and not c.name.startswith("_") for n in c.body]
+    for node in body:
+        if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
+            continue
+        text = ast.get_docstring(node) or ""
+        named = [a.arg for a in (*node.args.args, *node.args.kwonlyargs) if a.arg != "self"]
+        if named and "Parameters\n---" not in text and "arguments and errors are theirs" not in text:
+            missing.append(f"{node.name}: Parameters")
+        if any(isinstance(n, ast.Raise) for n in ast.walk(node)) and "Raises\n---" not in text:
+            missing.append(f"{node.name}: Raises")
+    assert missing == []

@@ -17,6 +17,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
+from assets.formats.beside import written_beside
 from assets.formats.errors import FormatError
 
 LONGEST_S = 1800.0
@@ -108,26 +109,6 @@ class Audio:
         return len(self.samples) / self.sample_rate_hz
 
 
-def probe(path: Path) -> AudioHeader:
-    """Read the header of a file of music.
-
-    Parameters
-    ----------
-    path : wav, flac, ogg, opus, mp3, aiff …: whatever libsndfile decodes
-
-    Returns
-    -------
-    AudioHeader
-
-    Raises
-    ------
-    FormatError
-        If the file cannot be opened, is no audio that libsndfile knows, or has a rate outside 4 to 768 kHz.
-    """
-    with _opened(path) as sound:
-        return _header(sound, path)
-
-
 def read(path: Path, *, limit_s: float = LONGEST_S) -> Audio:
     """Decode a file of music.
 
@@ -136,7 +117,7 @@ def read(path: Path, *, limit_s: float = LONGEST_S) -> Audio:
     path : wav, flac, ogg, opus, mp3, aiff …: whatever libsndfile decodes
         The content decides, not the suffix; where they disagree ``remark`` says so.
     limit_s : float, seconds, > 0
-        Longest song accepted.
+        Longest song accepted. A longer one than :data:`LONGEST_S` lets as many more values in.
 
     Returns
     -------
@@ -157,8 +138,9 @@ def read(path: Path, *, limit_s: float = LONGEST_S) -> Audio:
     with _opened(path) as sound:
         header = _header(sound, path)
         most = int(limit_s * header.sample_rate_hz)
-        if header.n_frames > most or header.n_frames * header.n_channels > MOST_VALUES:
-            raise _too_long(path, header.duration_s, limit_s, header.n_channels)
+        most_values = int(MOST_VALUES * max(limit_s / LONGEST_S, 1.0))
+        if header.n_frames > most or header.n_frames * header.n_channels > most_values:
+            raise _too_long(path, header, header.n_frames, limit_s, most_values)
         stated = _stated_frames(sound, path, header)
         blocks: list[NDArray[np.float32]] = []
         n_frames = 0
@@ -177,7 +159,7 @@ def read(path: Path, *, limit_s: float = LONGEST_S) -> Audio:
             blocks.append(block)
             n_frames += len(block)
     if n_frames > most:
-        raise _too_long(path, n_frames / header.sample_rate_hz, limit_s, header.n_channels)
+        raise _too_long(path, header, n_frames, limit_s, most_values)
     if n_frames == 0:
         raise FormatError(str(path), 0, "want at least one sample, got none; export the song again")
     if stated - n_frames > header.sample_rate_hz // 10:
@@ -227,9 +209,8 @@ def format_wav(audio: Audio) -> bytes:
 
 def write_wav(path: Path, audio: Audio) -> None:
     """Write :func:`format_wav` beside ``path``, then rename: the file is whole or not there."""
-    beside = path.with_name(path.name + ".part")
-    beside.write_bytes(format_wav(audio))
-    beside.replace(path)
+    with written_beside(path) as partial:
+        partial.write_bytes(format_wav(audio))
 
 
 @contextmanager
@@ -302,10 +283,10 @@ def _data_chunk(file: BinaryIO) -> tuple[int, int]:
     return 0, 0
 
 
-def _too_long(path: Path, duration_s: float, limit_s: float, n_channels: int) -> FormatError:
+def _too_long(path: Path, header: AudioHeader, n_frames: int, limit_s: float, most_values: int) -> FormatError:
     return FormatError(
         str(path),
         0,
-        f"want at most {limit_s:g} s and {MOST_VALUES} values, got {duration_s:.0f} s of {n_channels} channels; "
-        "cut the song shorter",
+        f"want at most {limit_s:g} s and {most_values} values, got {n_frames / header.sample_rate_hz:.0f} s of "
+        f"{header.n_channels} channels at {header.sample_rate_hz} Hz; cut the song shorter, or raise longest_song_s",
     )

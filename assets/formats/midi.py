@@ -84,12 +84,14 @@ class _Reader:
         raise self.fail("want a variable-length number of at most 4 bytes")
 
 
-def read(path: Path) -> Midi:
+def read(path: Path, *, limit_s: float = LONGEST_S) -> Midi:
     """Read a MIDI file.
 
     Parameters
     ----------
     path : file of at most 64 MiB
+    limit_s : float, seconds, > 0
+        Longest song accepted.
 
     Returns
     -------
@@ -107,7 +109,7 @@ def read(path: Path) -> Midi:
         data = path.read_bytes()
     except OSError as error:
         raise FormatError(str(path), 0, f"want a readable file, got: {error.strerror}") from error
-    return parse(data, name=str(path))
+    return parse(data, name=str(path), limit_s=limit_s)
 
 
 def parse(data: bytes, *, name: str = "midi", limit_s: float = LONGEST_S) -> Midi:

@@ -7,8 +7,11 @@ import json
 import os
 import stat
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+
+from assets.formats.beside import written_beside
 
 
 @dataclass(frozen=True)
@@ -138,11 +141,7 @@ class HashCache:
         """Write what was learnt, beside and renamed; a read-only studio only loses the memory."""
         if not self._is_changed:
             return
-        beside = self._store.with_name(f".{self._store.name}.{os.getpid()}.tmp")
-        try:
-            self._store.parent.mkdir(parents=True, exist_ok=True)
-            beside.write_text(json.dumps(self._known, sort_keys=True))
-            beside.replace(self._store)
+        with suppress(OSError):
+            with written_beside(self._store) as partial:
+                partial.write_text(json.dumps(self._known, sort_keys=True))
             self._is_changed = False
-        except OSError:
-            beside.unlink(missing_ok=True)

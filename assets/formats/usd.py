@@ -10,17 +10,16 @@ bytes; files are written beside their place and renamed into it.
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdMedia, UsdShade, UsdSkel, Vt
 
-from assets.formats import usd_read
+from assets.formats import beside, usd_read
 from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.types import Clip, Float, Skeleton
@@ -284,26 +283,28 @@ def _to_usd(value: object, name: str) -> object:
 
 @contextmanager
 def written_beside(path: Path) -> Iterator[Path]:
-    """Give a place to write, renamed to ``path`` at the end and removed where that fails.
+    """Give a place to write as :func:`assets.formats.beside.written_beside`, which refuses in a sentence.
+
+    Parameters
+    ----------
+    path : Path
+
+    Yields
+    ------
+    Path of the same suffix, in the same folder
 
     Raises
     ------
     OSError
         One sentence with the reason; what stood at ``path`` before still stands.
     """
-    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield partial
-        partial.replace(path)
+        with beside.written_beside(path, suffix=path.suffix) as partial:
+            yield partial
     except OSError as error:
         raise OSError(
             f"{path}: want a place to write, got: {error.strerror or error}; nothing was changed there"
         ) from error
-    finally:
-        # Where even the folder is none, there is nothing to remove.
-        with suppress(OSError):
-            partial.unlink()
 
 
 def save(layer: Sdf.Layer, path: Path) -> None:

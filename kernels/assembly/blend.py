@@ -87,13 +87,34 @@ def sample(clip: Clip, time_s: Float) -> tuple[Float, Float]:
 
 
 def ease(x: Float) -> Float:
-    """Rise from 0 to 1 with no slope at either end: 3x^2 - 2x^3 on [0, 1] (Kovar et al. 2002)."""
+    """Rise from 0 to 1 with no slope at either end: 3x^2 - 2x^3 on [0, 1] (Kovar et al. 2002).
+
+    Parameters
+    ----------
+    x : (...) float
+
+    Returns
+    -------
+    (...) float64, 0 to 1; held beyond [0, 1]
+    """
     x = np.clip(x, 0.0, 1.0)
     return x * x * (3 - 2 * x)
 
 
 def turn(root_xyz_m: Float, rotation_wxyz: Float, angle_rad: float) -> tuple[Float, Float]:
-    """Turn a motion about the vertical through the origin: (F, 3) and (F, J, 4) local."""
+    """Turn a motion about the vertical through the origin: (F, 3) and (F, J, 4) local.
+
+    Parameters
+    ----------
+    root_xyz_m : (F, 3) float, metres
+    rotation_wxyz : (F, J, 4) float, unit, local to the parent
+    angle_rad : float, radians, from +Z towards +X
+
+    Returns
+    -------
+    root_xyz_m : (F, 3) float64, metres
+    rotation_wxyz : (F, J, 4) float64, unit, local
+    """
     q = rotation.from_heading(angle_rad)
     turned = rotation_wxyz.copy()
     turned[:, 0] = rotation.mul(q, rotation_wxyz[:, 0])

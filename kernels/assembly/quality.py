@@ -159,6 +159,17 @@ def lag_measures(dance: Dance, steps: Choreography, music_beat_s: Float) -> list
 
     Measured on the finished frames: where the dominant clip's time, read from the lineage, passes the step's start in
     the clip, against the music beat there. Steps that start on an added beat do not count.
+
+    Parameters
+    ----------
+    dance : Dance
+    steps : Choreography it was assembled from
+    music_beat_s : (B,) float, seconds, as heard
+
+    Returns
+    -------
+    list of Measure
+        The worst lag, milliseconds; 0 where no step starts on a beat.
     """
     is_heard = [np.min(np.abs(music_beat_s - s), initial=np.inf) < 1e-6 for s in steps.song_start_s]
     crossed_s = [
@@ -176,7 +187,17 @@ def lag_measures(dance: Dance, steps: Choreography, music_beat_s: Float) -> list
 
 
 def warp_measures(steps: Choreography) -> list[Measure]:
-    """Judge the pace: song time over clip time of every step."""
+    """Judge the pace: song time over clip time of every step.
+
+    Parameters
+    ----------
+    steps : Choreography of at least one step
+
+    Returns
+    -------
+    list of Measure
+        Share of steps near their own pace, least and most warp ratio.
+    """
     warp = steps.warp_ratio
     easy, least, most = (
         float(np.mean((warp >= 0.90 - _SLACK) & (warp <= 1.10 + _SLACK))),

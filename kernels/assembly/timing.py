@@ -72,6 +72,14 @@ class Clock:
         """Seconds of motion danced up to a song time, (n,); linear beyond the ends.
 
         A monotone cubic through the boundaries (Fritsch and Carlson, 1980), so that speed does not jump at a beat.
+
+        Parameters
+        ----------
+        time_s : (n,) float, seconds of the song
+
+        Returns
+        -------
+        (n,) float64, seconds of motion
         """
         cubic = scipy.interpolate.PchipInterpolator(self.song_s, self.motion_s)
         inside = np.clip(time_s, self.song_s[0], self.song_s[-1])
@@ -81,7 +89,21 @@ class Clock:
 
 
 def clock(steps: Choreography) -> Clock:
-    """Make the clock of a choreography of at least one step."""
+    """Make the clock of a choreography of at least one step.
+
+    Parameters
+    ----------
+    steps : Choreography of S steps
+
+    Returns
+    -------
+    Clock of S + 1 boundaries
+
+    Raises
+    ------
+    ValueError
+        If there is no step.
+    """
     if not len(steps.clip_id):
         raise ValueError("steps: want at least one, got none")
     song_s = np.append(steps.song_start_s, steps.song_end_s[-1])

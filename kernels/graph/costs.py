@@ -98,7 +98,17 @@ def warp_cost(ratio: Float, costs: PathCosts) -> Float:
 
 
 def stride_cost(motion_beats: int, music_beats: int, costs: PathCosts) -> float:
-    """Price of dancing in half- or double-time: ``stride · |log2(m / d)|``; 0 for beat on beat."""
+    """Price of dancing in half- or double-time: ``stride · |log2(m / d)|``; 0 for beat on beat.
+
+    Parameters
+    ----------
+    motion_beats, music_beats : int, >= 1
+    costs : PathCosts
+
+    Returns
+    -------
+    float, >= 0
+    """
     return costs.stride * abs(float(np.log2(motion_beats / music_beats)))
 
 
@@ -122,7 +132,17 @@ def beat_cost(graph: MotionGraph, end: Int, music_beats: int, costs: PathCosts) 
 
 
 def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:
-    """Price of each transition by its weight, (E,) float64: ``seam + transition · weight / scale``."""
+    """Price of each transition by its weight, (E,) float64: ``seam + transition · weight / scale``.
+
+    Parameters
+    ----------
+    graph : MotionGraph of E transitions
+    costs : PathCosts
+
+    Returns
+    -------
+    (E,) float64, >= 0; empty without transitions
+    """
     scale = costs.transition_scale
     if scale is None:
         scale = float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0
@@ -130,7 +150,17 @@ def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:
 
 
 def jump_back_cost(graph: MotionGraph, costs: PathCosts) -> Float:
-    """Price of each transition that goes back to what may just have been danced, (E,) float64."""
+    """Price of each transition that goes back to what may just have been danced, (E,) float64.
+
+    Parameters
+    ----------
+    graph : MotionGraph of E transitions
+    costs : PathCosts
+
+    Returns
+    -------
+    (E,) float64, 0 or ``jump_back``; empty without transitions
+    """
     back_s = graph.time_s[graph.source] - graph.time_s[graph.target]
     same = graph.clip_index[graph.source] == graph.clip_index[graph.target]
     return np.where(same & (back_s >= 0) & (back_s <= costs.jump_back_window_s), costs.jump_back, 0.0)
@@ -158,5 +188,15 @@ def usage_cost(shown: Int, n_nodes: int, costs: PathCosts) -> Float:
 
 
 def is_within(ratio: Float, bounds: tuple[float, float]) -> NDArray[np.bool_]:
-    """Whether warp ratios lie within bounds, with room for the last bits: (...) bool."""
+    """Whether warp ratios lie within bounds, with room for the last bits: (...) bool.
+
+    Parameters
+    ----------
+    ratio : (...) float, song time ÷ clip time
+    bounds : (low, high), 0 < low <= high
+
+    Returns
+    -------
+    (...) bool
+    """
     return np.asarray((ratio >= bounds[0] * (1 - 1e-9)) & (ratio <= bounds[1] * (1 + 1e-9)))

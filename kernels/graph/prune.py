@@ -42,7 +42,16 @@ class Pruned:
 
 
 def keep_all(graph: MotionGraph) -> Pruned:
-    """Keep every node: a loss of nothing, to compare with."""
+    """Keep every node: a loss of nothing, to compare with.
+
+    Parameters
+    ----------
+    graph : MotionGraph
+
+    Returns
+    -------
+    Pruned; empty for an empty graph
+    """
     return _report(graph, np.ones(len(graph.clip_index), bool))
 
 
@@ -85,6 +94,10 @@ def keep_strongest(graph: MotionGraph) -> Pruned:
     docstring). Of components equally large, the one with the first node. Nothing is kept when no dance can come back
     to where it was.
 
+    Parameters
+    ----------
+    graph : MotionGraph
+
     Returns
     -------
     Pruned; empty for an empty graph
@@ -107,6 +120,10 @@ def keep_endless(graph: MotionGraph) -> Pruned:
     The default: it loses less than :func:`keep_strongest`, which also drops what can be danced once but not come back
     to, and unlike :func:`remove_dead_ends` leaves no node where a dance would get stuck.
 
+    Parameters
+    ----------
+    graph : MotionGraph
+
     Returns
     -------
     Pruned; empty for an empty graph
@@ -123,7 +140,16 @@ def keep_endless(graph: MotionGraph) -> Pruned:
 
 
 def has_endless_dance(graph: MotionGraph) -> bool:
-    """Whether any dance can go on for ever."""
+    """Whether any dance can go on for ever.
+
+    Parameters
+    ----------
+    graph : MotionGraph
+
+    Returns
+    -------
+    bool; False for an empty graph
+    """
     return bool(keep_endless(graph).is_kept.any())
 
 

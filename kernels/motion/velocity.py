@@ -152,6 +152,11 @@ def jerk(position_m: Float, frame_rate_hz: float) -> Float:
     -------
     (F,) float64, metres per second cubed
         The difference over frames f-1 to f+2 stands at f; zeros where there is none. All zeros when F < 4.
+
+    Raises
+    ------
+    ValueError
+        If the shape is not (F, J, 3) with J >= 1, a value is not finite, or the rate is not > 0.
     """
     check_position(position_m, frame_rate_hz)
     result = np.zeros(len(position_m))

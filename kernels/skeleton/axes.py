@@ -78,7 +78,18 @@ def infer_world(skeleton: Skeleton, joint: Mapping[str, str] | None, position: F
 
 
 def stature(skeleton: Skeleton, joint: Mapping[str, str]) -> float:
-    """Body height by the length of the legs, in the skeleton's units; 0 where the legs have no length."""
+    """Body height by the length of the legs.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    joint : canonical joint to the skeleton's, the feet among them
+
+    Returns
+    -------
+    float, >= 0, in the skeleton's units
+        0 where the legs have no length.
+    """
     at = {name: skeleton.joints.index(source) for name, source in joint.items()}
     length = np.linalg.norm(skeleton.offset_xyz_m, axis=-1)
     leg = 0.0
@@ -107,26 +118,66 @@ def metres_per_unit(height: float) -> float:
 
 
 def vectors_to_y_up(vector: Float, up_axis: str) -> Float:
-    """Turn vectors (..., 3) of a file with the given up axis to Y up."""
+    """Turn vectors (..., 3) of a file with the given up axis to Y up.
+
+    Parameters
+    ----------
+    vector : (..., 3) float, of any unit
+    up_axis : "Y" or "Z", of the file
+
+    Returns
+    -------
+    (..., 3) float64, of the same unit
+    """
     if up_axis == "Y":
         return np.asarray(vector, np.float64)
     return np.stack([vector[..., 0], vector[..., 2], -vector[..., 1]], axis=-1)
 
 
 def rotations_to_y_up(rotation_wxyz: Float, up_axis: str) -> Float:
-    """Turn local rotations (..., 4) of a file with the given up axis to Y up: their axes turn as vectors do."""
+    """Turn local rotations (..., 4) of a file with the given up axis to Y up: their axes turn as vectors do.
+
+    Parameters
+    ----------
+    rotation_wxyz : (..., 4) float, unit, local
+    up_axis : "Y" or "Z", of the file
+
+    Returns
+    -------
+    (..., 4) float64, unit, local
+    """
     return np.concatenate([rotation_wxyz[..., :1], vectors_to_y_up(rotation_wxyz[..., 1:], up_axis)], axis=-1)
 
 
 def vectors_from_y_up(vector: Float, up_axis: str) -> Float:
-    """Invert :func:`vectors_to_y_up`."""
+    """Invert :func:`vectors_to_y_up`.
+
+    Parameters
+    ----------
+    vector : (..., 3) float, of any unit, Y up
+    up_axis : "Y" or "Z", of the file
+
+    Returns
+    -------
+    (..., 3) float64, of the same unit
+    """
     if up_axis == "Y":
         return np.asarray(vector, np.float64)
     return np.stack([vector[..., 0], -vector[..., 2], vector[..., 1]], axis=-1)
 
 
 def rotations_from_y_up(rotation_wxyz: Float, up_axis: str) -> Float:
-    """Invert :func:`rotations_to_y_up`."""
+    """Invert :func:`rotations_to_y_up`.
+
+    Parameters
+    ----------
+    rotation_wxyz : (..., 4) float, unit, local, Y up
+    up_axis : "Y" or "Z", of the file
+
+    Returns
+    -------
+    (..., 4) float64, unit, local
+    """
     return np.concatenate([rotation_wxyz[..., :1], vectors_from_y_up(rotation_wxyz[..., 1:], up_axis)], axis=-1)
 
 

@@ -90,7 +90,17 @@ def forward_some(
 
 
 def place(clip: Clip) -> tuple[Float, Float]:
-    """World positions and orientations of a clip: :func:`forward` on its own skeleton."""
+    """World positions and orientations of a clip: :func:`forward` on its own skeleton.
+
+    Parameters
+    ----------
+    clip : Clip of F frames and J joints
+
+    Returns
+    -------
+    position_xyz_m : (F, J, 3) float64, metres, world
+    orientation_wxyz : (F, J, 4) float64, unit, world
+    """
     return forward(clip.skeleton, clip.root_xyz_m, clip.rotation_wxyz, translation_xyz_m=clip.translation_xyz_m)
 
 
@@ -115,7 +125,16 @@ def to_local(skeleton: Skeleton, orientation_wxyz: Float) -> Float:
 
 
 def rest_position(skeleton: Skeleton) -> Float:
-    """World positions at rest, (J, 3) float64, metres."""
+    """World positions at rest, (J, 3) float64, metres.
+
+    Parameters
+    ----------
+    skeleton : Skeleton of J joints
+
+    Returns
+    -------
+    (J, 3) float64, metres
+    """
     position = skeleton.offset_xyz_m.astype(np.float64).copy()
     for k in range(1, len(skeleton.joints)):
         position[k] += position[skeleton.parent[k]]

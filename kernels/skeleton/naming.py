@@ -43,10 +43,6 @@ class JointMapping:
     joint: Mapping[str, str]
     family: str
 
-    def canonical_of(self, source: str) -> str | None:
-        """Canonical name of a joint of the rig, or None."""
-        return next((name for name, joint in self.joint.items() if joint == source), None)
-
 
 def _family(centre: str, arm: str, leg: str) -> dict[str, tuple[str, ...]]:
     """Names by part: parts are separated by spaces, spellings of one by slashes."""

@@ -220,9 +220,24 @@ def test_setting_that_no_kernel_takes_is_one_sentence(fresh_studio):
 def test_device_that_is_not_there_is_an_error(fresh_studio):
     (fresh_studio / "odori.toml").write_text("[opencl]\ndevice = 'no such card'\n")
     done = odori("build", "--studio", fresh_studio, "--json")
-    assert done.returncode == 1
-    (failed,) = json.loads(done.stdout)["failed"]
-    assert "no such card" in failed
+    assert done.returncode == 2
+    assert "[opencl] device: want 'no such card', found" in json.loads(done.stdout)["error"]
+    assert not (fresh_studio / "lake").exists()
+
+
+def test_a_joint_that_is_none_refuses_the_settings_not_every_clip(fresh_studio):
+    (fresh_studio / "odori.toml").write_text("[joints]\nLeftAnkle = 'leftFoots'\n")
+    done = odori("build", "--studio", fresh_studio)
+    assert done.returncode == 2
+    assert "[joints] 'LeftAnkle': want a canonical joint, got 'leftFoots'; did you mean 'leftFoot'?" in done.stderr
+    assert not (fresh_studio / "lake").exists()
+
+
+def test_a_number_without_end_is_refused(fresh_studio):
+    (fresh_studio / "odori.toml").write_text("[limits]\nlongest_song_s = inf\n")
+    done = odori("build", "--studio", fresh_studio)
+    assert done.returncode == 2
+    assert "[limits] longest_song_s: want a finite number, got inf" in done.stderr
 
 
 def test_broken_clips_csv_is_a_note(fresh_studio, build):

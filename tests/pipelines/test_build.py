@@ -12,6 +12,7 @@ import dagster as dg
 import pyarrow.parquet as pq
 import pytest
 
+from kernels.opencl.device import pick_device
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.resources import StudioError, StudioFolder
@@ -29,7 +30,7 @@ def metadata(root, asset, key):
     """What Dagster keeps of the last materialisation of a partition."""
     instance = building.open_instance(StudioFolder(root))
     records = instance.fetch_materializations(
-        dg.AssetRecordsFilter(asset_key=dg.AssetKey(asset), asset_partitions=[key]), limit=1
+        dg.AssetRecordsFilter(asset_key=dg.AssetKey(asset), asset_partitions=[key] if key else None), limit=1
     ).records
     return {name: value.value for name, value in records[0].asset_materialization.metadata.items()}
 
@@ -42,6 +43,8 @@ def test_first_build_makes_everything_and_says_so(fresh_studio, build):
     assert {"clip", "pose", "canonical_pose", "motion_beat", "music_beat", "motion_graph_edge"} <= ran(outcome)
     assert "usd_animation" not in ran(outcome)
     assert metadata(fresh_studio, "clip", "ayame")["computed_clips"] == 3
+    device = pick_device()
+    assert device.name.strip() in metadata(fresh_studio, "motion_graph_node", "")["device"]
 
 
 def test_unchanged_studio_runs_nothing(studio, build):
@@ -181,8 +184,11 @@ def test_killed_build_is_finished_by_the_next_one(fresh_studio, built, build):
     process.send_signal(signal.SIGKILL)
     process.wait()
     (fresh_studio / "lake" / "pose" / ".tmp-left").write_bytes(b"half")
+    (fresh_studio / "lake" / ".tmp-left").write_bytes(b"half")
+    (fresh_studio / "dances" / "beat").mkdir(parents=True)
+    (fresh_studio / "dances" / "beat" / ".tmp-left.usdc").write_bytes(b"half")
     assert build(fresh_studio).status == 0
-    assert not list((fresh_studio / "lake").rglob(".tmp-*"))
+    assert not list(fresh_studio.rglob(".tmp-*"))
     assert build(fresh_studio).facts["ran"] == []
     instance = building.open_instance(StudioFolder(fresh_studio))
     assert not instance.get_runs(dg.RunsFilter(statuses=[dg.DagsterRunStatus.STARTED]))

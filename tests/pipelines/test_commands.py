@@ -172,7 +172,10 @@ def test_check_of_a_good_a_damaged_and_a_missing_stage(built, tmp_path):
     facts = json.loads(done.stdout)
     assert not facts["is_valid"]
     assert {"severity", "rule", "prim", "sentence"} == set(facts["findings"][0])
-    assert odori("check", tmp_path / "nowhere.usdz").returncode == 1
+    for nothing in (tmp_path / "nowhere.usdz", tmp_path):
+        done = odori("check", nothing)
+        assert done.returncode == 2
+        assert f"{nothing}: want a stage, got no such file" in done.stderr
 
 
 @pytest.mark.parametrize("command", [[], ["build"], ["dance"], ["check"], ["status"], ["ui"], ["demo"]])

@@ -4,7 +4,7 @@ from dataclasses import fields, is_dataclass
 
 import pytest
 
-from schemas.settings import Brief, DanceSettings, MotionBeatSettings, MotionGraphSettings, Settings
+from schemas.settings import BeatsBrief, Brief, DanceSettings, MotionBeatSettings, MotionGraphSettings, Settings
 
 
 def declared(record):
@@ -29,7 +29,10 @@ def test_every_key_has_a_meaning(record):
         (MotionBeatSettings, {"component": 0}, "component: want at least 1, got 0"),
         (MotionGraphSettings, {"neighbours": -1}, "neighbours"),
         (DanceSettings, {"frame_rate_hz": 1000.0}, "want 1 to 240"),
-        (DanceSettings, {"blend_s": float("nan")}, "blend_s"),
+        (DanceSettings, {"blend_s": float("nan")}, "blend_s: want a finite number, got nan"),
+        (DanceSettings, {"blend_s": float("inf")}, "blend_s: want a finite number, got inf"),
+        (BeatsBrief, {"nudge_ms": float("-inf")}, "nudge_ms: want a finite number"),
+        (BeatsBrief, {"nudge_beats": float("nan")}, "nudge_beats: want a finite number"),
     ],
 )
 def test_values_are_checked(kind, wrong, word):

@@ -63,11 +63,11 @@ def test_one_sample(tmp_path):
 
 
 def test_header_agrees_with_what_is_decoded(tmp_path, tone):
-    header = audio.probe(write(tmp_path / "a.flac", tone))
-    assert (header.n_frames, header.n_channels, header.sample_rate_hz) == (2 * RATE, 2, RATE)
-    assert header.format_name == "FLAC/PCM_16"
-    assert header.duration_s == 2.0
-    assert header.remark == ""
+    sound = audio.read(write(tmp_path / "a.flac", tone))
+    assert (*sound.samples.shape, sound.sample_rate_hz) == (2 * RATE, 2, RATE)
+    assert sound.format_name == "FLAC/PCM_16"
+    assert sound.duration_s == 2.0
+    assert sound.remark == ""
 
 
 def test_content_decides_and_the_remark_says_so(tmp_path, tone):
@@ -195,3 +195,12 @@ def test_real_songs_decode_whole(data_dir):
     lengths_s = {"fof_muldjord_chaos_god.ogg": 60.0, "us_Not_About_You.mp3": 45.0, "madmom_sample.wav": 2.8}
     for name, length_s in lengths_s.items():
         assert audio.read(data_dir / "audio_beats" / name).duration_s == pytest.approx(length_s, abs=0.06)
+
+
+def test_a_raised_limit_lets_as_many_more_values_in(tmp_path, monkeypatch):
+    monkeypatch.setattr(audio, "MOST_VALUES", 8000)
+    monkeypatch.setattr(audio, "LONGEST_S", 1.0)
+    path = tmp_path / "wide.wav"
+    audio.write_wav(path, Audio(np.zeros((8000, 2), np.float32), 8000))
+    assert "at most 1 s and 8000 values, got 1 s of 2 channels" in refusal(path, limit_s=1.0)
+    assert audio.read(path, limit_s=2.0).duration_s == 1.0

@@ -251,12 +251,6 @@ def test_side_and_part(name, side, part):
     assert naming.side_and_part(name) == (side, part)
 
 
-def test_canonical_of():
-    mapping = naming.JointMapping({"hips": "pelvis"}, "user")
-    assert mapping.canonical_of("pelvis") == "hips"
-    assert mapping.canonical_of("tail") is None
-
-
 def test_a_rig_at_the_worlds_origin_is_no_hindrance():
     skeleton = rig(STUDIOS["bandai"], has_root=True)
     assert skeleton.joints[0] == "Root"
