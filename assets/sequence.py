@@ -27,7 +27,7 @@ EASY_WARP = (0.90, 1.10)
 APART_S = 0.1
 """How far apart moments of one clip are that pass for neighbours: a quarter of the usual blend."""
 
-WARP_COST, UNEASY_COST, MARGIN_COST = 0.1, 3.0, 0.5
+WARP_COST, MARGIN_COST = 0.1, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,7 @@ class Piece:
     intensity_cost: float
     warp_cost: float
     is_snapped: bool = False
+    is_easy: bool = True
 
     @property
     def cost(self) -> float:
@@ -206,7 +207,8 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
                 _of_match(found, i, rank, parts[i], beat_s, (song_edges, clip_edges), settings)
                 for rank in range(len(matches.clip_ids))
             ]
-            every.append(made)
+            # Pieces far from their own pace are for segments that have no others.
+            every.append([p for p in made if p.is_easy] or made)
             edges.append(end_s)
             continue
         names = sorted(found.clips)
@@ -264,7 +266,6 @@ def _of_match(
         intensity.rank_correlation(intensity.beat_means(music, cut), intensity.beat_means(motion, cut)),
     )
     warp = (end_s - start_s) / (clip_end_s - clip_s)
-    uneasy = 0.0 if EASY_WARP[0] - 1e-6 <= warp <= EASY_WARP[1] + 1e-6 else UNEASY_COST
     return Piece(
         matches.clip_ids[rank],
         clip_s,
@@ -272,8 +273,9 @@ def _of_match(
         rank + 1,
         settings.match_weight * match_cost(matches, rank),
         settings.intensity_weight * (1.0 - agreement),
-        WARP_COST * abs(float(np.log(warp))) / float(np.log(1.1)) + uneasy,
+        WARP_COST * abs(float(np.log(warp))) / float(np.log(1.1)),
         frame != start,
+        EASY_WARP[0] - 1e-6 <= warp <= EASY_WARP[1] + 1e-6,
     )
 
 
