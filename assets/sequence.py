@@ -14,7 +14,7 @@ from assets.lineage import Stored
 from assets.matching_tables import Rhythm, StoredMatches
 from kernels.assembly.timing import blend_widths
 from kernels.matching import connect, intensity, path
-from kernels.matching.pieces import longest_first, motion_under, snap_start, split_span
+from kernels.matching.pieces import ease_pace, longest_first, motion_under, snap_start, split_span
 from kernels.matching.score import SCALE_DENOMINATOR
 from kernels.motion.features import FEATURE_RATE_HZ, at_feature_rate, link_directions, link_weights
 from kernels.motion.velocity import usable_frames
@@ -208,7 +208,14 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
                 for rank in range(len(matches.clip_ids))
             ]
             # Pieces far from their own pace are for segments that have no others.
-            every.append([p for p in made if p.is_easy] or made)
+            easy = [p for p in made if p.is_easy]
+            if not easy:
+                made = [
+                    _of_match(found, i, rank, parts[i], beat_s, (song_edges, clip_edges), settings, is_eased=True)
+                    for rank in range(len(matches.clip_ids))
+                ]
+                easy = [p for p in made if p.is_easy]
+            every.append(easy or made)
             edges.append(end_s)
             continue
         names = sorted(found.clips)
@@ -238,11 +245,17 @@ def _of_match(
     beat_s: Float,
     edges: tuple[Float, Float],
     settings: MatchPathSettings,
+    *,
+    is_eased: bool = False,
 ) -> Piece:
     """Make one match a piece, and price it."""
     matches, segments = found.matches[segment], found.segments
     clip = found.clips[matches.clip_ids[rank]]
     numerator, start = int(matches.numerator[rank]), int(matches.start_frame_index[rank])
+    if is_eased:
+        numerator, start = ease_pace(
+            part, clip.rhythm, numerator=numerator, start_frame_index=start, loss_ratio=settings.snap_loss_ratio
+        )
     frame = snap_start(
         part,
         clip.rhythm,
