@@ -137,7 +137,12 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         for ps in pieces
     ]
     limits, joints = joints_of(pieces, spans, found.clips, canonical_pose, settings)
-    chosen = path.choose(candidates, joints, repetition_weight=settings.match_path.repetition_weight)
+    chosen = path.choose(
+        candidates,
+        joints,
+        repetition_weight=settings.match_path.repetition_weight,
+        unconnected_cost=settings.match_path.unconnected_cost or None,
+    )
     steps, span_of = path.to_choreography(
         candidates,
         chosen,
