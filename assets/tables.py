@@ -349,7 +349,10 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
 def from_choreography(
     song_id: str, method: str, steps: Choreography, costs: Mapping[str, Float], pin_ids: Sequence[str | None] = ()
 ) -> pa.Table:
-    """Pack a choreography, S rows; ``costs`` by column name, 0 where there are none; ``pin_ids`` by step, or empty for no pins."""
+    """Pack a choreography, S rows.
+
+    ``costs`` are by column name, 0 where there are none; ``pin_ids`` by step, empty for no pins.
+    """
     s = len(steps.clip_id)
     columns = {
         "song_id": pa.array([song_id] * s, pa.string()),
