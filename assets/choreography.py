@@ -1,7 +1,6 @@
 """What is danced when: the methods, each writing the same table."""
 
 import dagster as dg
-import numpy as np
 import pyarrow as pa
 
 from assets import tables
@@ -83,9 +82,5 @@ def choreography(
         with repeatable():
             danced = by_matching(found, canonical_pose, beat_s, settings)
     progress.step()
-    costs = {name: danced.costs.get(name, np.zeros(len(danced.steps.clip_id))) for name in COST_COLUMNS}
-    rows = tables.from_choreography(song_id, method, danced.steps, costs, danced.pin_ids)
+    rows = tables.from_choreography(song_id, method, danced.steps, danced.costs, danced.pin_ids)
     return Part(key, rows, request_version(studio, key), metadata=danced.metadata)
-
-
-COST_COLUMNS = tuple(name for name in CHOREOGRAPHY.arrow.names if name.endswith("_cost"))

@@ -21,10 +21,12 @@ from schemas.matching import MATCH
 class SegmentMatcher(Protocol):
     """Finds the best clips of segments; see :class:`kernels.matching.search.Matcher`."""
 
-    def matches(
-        self, segments: Sequence[NDArray[Any]], clips: Sequence[NDArray[Any]], *, k: int
-    ) -> Sequence[Sequence[Match]]:
-        """Find the k best clips of every segment."""
+    def index(self, clips: Sequence[NDArray[Any]]) -> Any:  # noqa: ANN401 - what only the matcher itself reads
+        """Prepare a catalogue for many songs."""
+        ...
+
+    def matches(self, segments: Sequence[NDArray[Any]], clips: Any, *, k: int) -> Sequence[Sequence[Match]]:  # noqa: ANN401
+        """Find the k best clips of every segment, of an index or of clips."""
         ...
 
 
@@ -51,14 +53,14 @@ def match(
     progress.begin("matching songs", len(keys))
     rhythms, left_out = catalogue(motion_feature)
     clip_ids = sorted(rhythms)
+    index = matcher.index([rhythms[clip] for clip in clip_ids])
     made, poor = [], []
     for key in keys:
         segments = matching_tables.to_music_segment(music_segment.read(key))
         rhythm = np.asarray(music_feature.read(key)["rhythm"].to_numpy(), np.float32)
         parts = matching_tables.segment_rhythms(segments, rhythm)
-        clips = [rhythms[clip] for clip in clip_ids]
         k = studio.settings().matching.candidates
-        found = matcher.matches(parts, clips, k=k) if parts and clips else [[] for _ in parts]
+        found = matcher.matches(parts, index, k=k) if parts and clip_ids else [[] for _ in parts]
         table = matching_tables.from_matches(key, found, clip_ids)
         stored = matching_tables.to_matches(table, len(parts))
         lacking = [i for i, m in enumerate(stored) if not len(m.score) or (parts[i].any() and not m.score[0] > 0)]

@@ -14,7 +14,7 @@ from assets.lineage import Stored
 from assets.matching_tables import Rhythm, StoredMatches
 from kernels.assembly.timing import blend_widths
 from kernels.matching import connect, intensity, path
-from kernels.matching.pieces import longest_first, motion_under, snap_start, split_span
+from kernels.matching.pieces import ease_pace, longest_first, motion_under, snap_start, split_span
 from kernels.matching.score import SCALE_DENOMINATOR
 from kernels.motion.features import FEATURE_RATE_HZ, at_feature_rate, link_directions, link_weights
 from kernels.motion.velocity import usable_frames
@@ -27,7 +27,7 @@ EASY_WARP = (0.90, 1.10)
 APART_S = 0.1
 """How far apart moments of one clip are that pass for neighbours: a quarter of the usual blend."""
 
-WARP_COST, UNEASY_COST, MARGIN_COST = 0.1, 3.0, 0.5
+WARP_COST, MARGIN_COST = 0.1, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,7 @@ class Piece:
     intensity_cost: float
     warp_cost: float
     is_snapped: bool = False
+    is_easy: bool = True
 
     @property
     def cost(self) -> float:
@@ -136,7 +137,12 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         for ps in pieces
     ]
     limits, joints = joints_of(pieces, spans, found.clips, canonical_pose, settings)
-    chosen = path.choose(candidates, joints, repetition_weight=settings.match_path.repetition_weight)
+    chosen = path.choose(
+        candidates,
+        joints,
+        repetition_weight=settings.match_path.repetition_weight,
+        unconnected_cost=settings.match_path.unconnected_cost or None,
+    )
     steps, span_of = path.to_choreography(
         candidates,
         chosen,
@@ -206,7 +212,15 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
                 _of_match(found, i, rank, parts[i], beat_s, (song_edges, clip_edges), settings)
                 for rank in range(len(matches.clip_ids))
             ]
-            every.append(made)
+            # Pieces far from their own pace are for segments that have no others.
+            easy = [p for p in made if p.is_easy]
+            if not easy:
+                made = [
+                    _of_match(found, i, rank, parts[i], beat_s, (song_edges, clip_edges), settings, is_eased=True)
+                    for rank in range(len(matches.clip_ids))
+                ]
+                easy = [p for p in made if p.is_easy]
+            every.append(easy or made)
             edges.append(end_s)
             continue
         names = sorted(found.clips)
@@ -236,11 +250,17 @@ def _of_match(
     beat_s: Float,
     edges: tuple[Float, Float],
     settings: MatchPathSettings,
+    *,
+    is_eased: bool = False,
 ) -> Piece:
     """Make one match a piece, and price it."""
     matches, segments = found.matches[segment], found.segments
     clip = found.clips[matches.clip_ids[rank]]
     numerator, start = int(matches.numerator[rank]), int(matches.start_frame_index[rank])
+    if is_eased:
+        numerator, start = ease_pace(
+            part, clip.rhythm, numerator=numerator, start_frame_index=start, loss_ratio=settings.snap_loss_ratio
+        )
     frame = snap_start(
         part,
         clip.rhythm,
@@ -264,7 +284,6 @@ def _of_match(
         intensity.rank_correlation(intensity.beat_means(music, cut), intensity.beat_means(motion, cut)),
     )
     warp = (end_s - start_s) / (clip_end_s - clip_s)
-    uneasy = 0.0 if EASY_WARP[0] - 1e-6 <= warp <= EASY_WARP[1] + 1e-6 else UNEASY_COST
     return Piece(
         matches.clip_ids[rank],
         clip_s,
@@ -272,8 +291,9 @@ def _of_match(
         rank + 1,
         settings.match_weight * match_cost(matches, rank),
         settings.intensity_weight * (1.0 - agreement),
-        WARP_COST * abs(float(np.log(warp))) / float(np.log(1.1)) + uneasy,
+        WARP_COST * abs(float(np.log(warp))) / float(np.log(1.1)),
         frame != start,
+        EASY_WARP[0] - 1e-6 <= warp <= EASY_WARP[1] + 1e-6,
     )
 
 

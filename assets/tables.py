@@ -347,7 +347,10 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
 def from_choreography(
     song_id: str, method: str, steps: Choreography, costs: Mapping[str, Float], pin_ids: Sequence[str | None] = ()
 ) -> pa.Table:
-    """Pack a choreography, S rows; ``costs`` by column name, ``pin_ids`` by step, or empty for no pins."""
+    """Pack a choreography, S rows.
+
+    ``costs`` are by column name, 0 where there are none; ``pin_ids`` by step, empty for no pins.
+    """
     s = len(steps.clip_id)
     columns = {
         "song_id": pa.array([song_id] * s, pa.string()),
@@ -362,7 +365,7 @@ def from_choreography(
         "blend_s": pa.array(steps.blend_s, pa.float32()),
         "warp_ratio": pa.array(steps.warp_ratio, pa.float32()),
         "pin_id": pa.array(pin_ids or [None] * s, pa.string()),
-        **{name: pa.array(cost, pa.float32()) for name, cost in costs.items()},
+        **{name: pa.array(costs.get(name, np.zeros(s)), pa.float32()) for name in _COST_COLUMNS},
     }
     return CHOREOGRAPHY.check(pa.table([columns[c] for c in CHOREOGRAPHY.arrow.names], schema=CHOREOGRAPHY.arrow))
 
@@ -375,6 +378,7 @@ def to_choreography(rows: pa.Table) -> Choreography:
     )
 
 
+_COST_COLUMNS = tuple(name for name in CHOREOGRAPHY.arrow.names if name.endswith("_cost"))
 _STEP_SECONDS = ("song_start_s", "song_end_s", "clip_start_s", "clip_end_s", "blend_s")
 
 

@@ -24,6 +24,6 @@ MATCH = Table(
         _START_FRAME,
         Column("score", pa.float64(), "C: sum of a b / (a + b) over the segment, music a, motion b; higher is better."),
         Column("music_ratio", pa.float64(), "C over half the sum of a: 1 where the motion equals the music."),
-        Column("mutual_ratio", pa.float64(), "4 C over the sums of a and b: 1 only where both are equal."),
+        Column("mutual_ratio", pa.float64(), "Four times C over the sums of a and b: 1 only where both are equal."),
     ),
 )

@@ -115,6 +115,11 @@ class MatchPathSettings(_Checked):
     intensity_weight: float = key(1.0, "Weight of intensity unlike the music's.", least=0)
     seam_weight: float = key(0.5, "Weight of seams between unlike poses.", least=0)
     repetition_weight: float = key(1.0, "Weight of showing again what was shown.", least=0)
+    unconnected_cost: float = key(
+        0.0,
+        "Price of a seam between poses beyond the thresholds; 0: as few of them as can be, before any cost counts.",
+        least=0,
+    )
     snap_loss_ratio: float = key(
         0.05,
         "A piece starts on a beat of its clip where that loses less than this share of its score.",

@@ -122,6 +122,9 @@ def choose(
 ) -> Chosen:
     """Choose one candidate a segment.
 
+    A piece that shows again more than half of what the piece before it showed is no connection, however alike the
+    poses: else a catalogue in which little connects would be danced by one step over and over.
+
     Parameters
     ----------
     segments : S >= 1 Candidates
@@ -151,7 +154,8 @@ def choose(
     own = [c.cost for c in segments]
     goes_on = [continues(a, b) for a, b in itertools.pairwise(segments)]
     free = [np.where(on, 0.0, joint.cost) for joint, on in zip(joints, goes_on, strict=True)]
-    open_ = [~(joint.is_connected | on) for joint, on in zip(joints, goes_on, strict=True)]
+    again = [_shows_again(a, b) for a, b in itertools.pairwise(segments)]
+    open_ = [~((joint.is_connected & ~same) | on) for joint, on, same in zip(joints, goes_on, again, strict=True)]
     if unconnected_cost is None:
         unconnected_cost = 1.0 + sum(float(c.max()) for c in (*own, *free)) + repetition_weight * len(own) ** 2
     between = [cost + unconnected_cost * out for cost, out in zip(free, open_, strict=True)]
@@ -167,6 +171,15 @@ def choose(
         repeated,
         float(sum(c[i] for c, i in zip(own, choice, strict=True)) + seam.sum() + repeated.sum()),
     )
+
+
+def _shows_again(before: Candidates, after: Candidates) -> Mask:
+    """Whether each candidate after shows more than half of each before once more, (N, M) bool."""
+    shown = [
+        overlaps(after, int(c), float(a), float(b))
+        for c, a, b in zip(before.clip_index, before.start_s, before.end_s, strict=True)
+    ]
+    return np.asarray(np.stack(shown) > 0.5)
 
 
 def _repetition(segments: Sequence[Candidates], choice: Int) -> Float:

@@ -44,9 +44,21 @@ def built(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("DAGSTER_HOME", raising=False)
         root = write_studio(tmp_path_factory.mktemp("built") / "studio")
+        assert commands.build(root, dances=False, progress=NoProgress).status == 0
         outcome = commands.dance(root, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
         assert outcome.status == 0, outcome.troubles
         yield root
+
+
+@pytest.fixture(scope="session")
+def matched(built, tmp_path_factory):
+    """The small studio, its song danced by matching as well; not to be changed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("DAGSTER_HOME", raising=False)
+        root = Path(shutil.copytree(built, tmp_path_factory.mktemp("matched") / "studio"))
+        outcome = commands.dance(root, ["beat"], method="matching", frame_rate_hz=None, out=None, progress=NoProgress)
+        assert outcome.status == 0, outcome.troubles
+        return root
 
 
 @pytest.fixture

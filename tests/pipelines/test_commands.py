@@ -72,8 +72,8 @@ def test_whole_song_is_danced_and_every_frame_accounted_for(built):
     assert set(line["clip_id"].to_pylist()) <= {s["clip_id"] for s in steps}
 
 
-def test_every_declared_table_is_stored(built):
-    assert {p.name for p in (built / "lake").iterdir() if p.is_dir()} - {"request"} == set(TABLES)
+def test_every_declared_table_is_stored(matched):
+    assert {p.name for p in (matched / "lake").iterdir() if p.is_dir()} - {"request"} == set(TABLES)
 
 
 def test_dancing_again_changes_no_byte(studio):
@@ -196,7 +196,7 @@ def test_usage_errors_end_with_two(wrong):
 def test_wrong_method_and_wrong_suffix(built):
     done = odori("dance", "beat", "--method", "ballet", "--studio", built)
     assert done.returncode == 2
-    assert "want one of graph, got 'ballet'" in done.stderr
+    assert "want one of graph, matching, got 'ballet'" in done.stderr
     done = odori("dance", "beat", "--out", "x.fbx", "--studio", built)
     assert done.returncode == 2
     assert ".usdz or .usdc" in done.stderr

@@ -12,6 +12,10 @@ PROMISED = {
     "canonical_pose": "clip_id frame_index time_s root_xyz_m rotation_wxyz position_xyz_m",
     "motion_beat": "clip_id beat_index time_s frame_index confidence",
     "music_beat": "song_id beat_index time_s bar_number beat_in_bar_number confidence",
+    "motion_feature": "clip_id time_s rhythm intensity",
+    "music_feature": "song_id time_s rhythm intensity",
+    "music_segment": "song_id segment_index start_s end_s start_frame_index frame_count",
+    "match": "song_id segment_index rank_number clip_id scale_ratio start_frame_index score",
     "choreography": "step_index song_start_s song_end_s clip_id clip_start_s clip_end_s has_seam blend_s warp_ratio "
     "pin_id",
     "frame_lineage": "frame_index time_s clip_id clip_time_s blend_clip_id blend_time_s blend_weight_ratio warp_ratio",

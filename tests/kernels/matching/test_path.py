@@ -59,6 +59,14 @@ def test_connectivity_binds_before_anything_else(seed):
     assert (~found.is_connected).sum() == missing(found.choice) == min(missing(w) for w in every(songs))
 
 
+def test_showing_again_what_was_just_shown_is_no_connection():
+    songs = [candidates([0]), candidates([0, 0], clip=[0, 1], start=[0.2, 0])]
+    found = choose(songs, [joint([[0, 9]], [[True, True]])], repetition_weight=0)
+    np.testing.assert_array_equal(found.choice, [0, 1])
+    found = choose(songs, [joint([[0, 9]], [[True, False]])], repetition_weight=0)
+    assert not found.is_connected[1]
+
+
 def test_where_nothing_connects_the_nearest_poses_are_taken_and_said():
     songs = [candidates([0, 0]), candidates([0, 0], clip=[2, 3])]
     found = choose(songs, [joint([[3, 1], [2, 4]], np.zeros((2, 2)))])
@@ -73,14 +81,15 @@ def test_equal_costs_go_to_the_first():
 
 
 def test_showing_the_same_again_costs():
-    songs = [candidates([0, 0.3]) for _ in range(3)]
-    joints = [joint(np.ones((2, 2))) for _ in range(2)]
+    songs = [candidates([0, 0.3]), candidates([0], clip=[7]), candidates([0, 0.3])]
+    joints = [joint(np.ones((2, 1))), joint(np.ones((1, 2)))]
     again = choose(songs, joints, repetition_weight=0)
     spread = choose(songs, joints, repetition_weight=1.0)
     np.testing.assert_array_equal(again.choice, [0, 0, 0])
     assert again.repetition_cost.sum() == 0
     assert sorted(spread.choice) == [0, 0, 1]
-    assert spread.repetition_cost.sum() == pytest.approx(1)
+    assert spread.repetition_cost.sum() == 0
+    assert choose(songs, joints, repetition_weight=0.1).repetition_cost.sum() == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("seed", range(6))

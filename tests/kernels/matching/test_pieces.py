@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.matching.pieces import longest_first, motion_under, snap_start, split_span
+from kernels.matching.pieces import ease_pace, longest_first, motion_under, snap_start, split_span
 from kernels.motion.features import bumps
 
 SEGMENT = bumps(240, np.array([0.0, 60, 120, 180]), np.ones(4), width_s=0.05)
@@ -58,3 +58,15 @@ def test_no_part_is_too_long(longest_s):
 
 def test_the_longest_clips_come_first_and_equal_ones_in_order():
     np.testing.assert_array_equal(longest_first(np.array([3, 9, 9, 1]), most=3), [1, 2, 0])
+
+
+def test_a_slow_match_comes_nearer_to_its_own_pace_where_that_costs_little():
+    lonely = bumps(240, np.array([120.0]), np.ones(1), width_s=0.05)
+    moving = bumps(480, np.array([168.0]), np.ones(1), width_s=0.05)
+    how = {"numerator": 45, "start_frame_index": 60}
+    numerator, start = ease_pace(lonely, moving, loss_ratio=0.05, **how)
+    assert (numerator, start) == (46, 58)
+    assert ease_pace(lonely, moving, loss_ratio=0.0, **how) == (45, 60)
+    assert ease_pace(lonely, moving, numerator=50, start_frame_index=60, loss_ratio=1.0) == (50, 60)
+    assert ease_pace(lonely, moving[:280], numerator=45, start_frame_index=60, loss_ratio=1.0)[0] == 46
+    assert ease_pace(lonely, moving[:20], numerator=45, start_frame_index=0, loss_ratio=1.0) == (45, 0)
