@@ -105,7 +105,7 @@ class Program:
         cl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(content), dst_offset=offset_bytes)
 
     def _program(self, name: str, is_safe: bool) -> cl.Program:
-        files = _INDEX if name in ("sum_frames", "sum_blocks", "largest_of_8") else _SEARCH
+        files = _INDEX if name in ("sum_frames", "sum_blocks", "largest_of") else _SEARCH
         key = (files[0], is_safe and files is _SEARCH)
         if key not in self._built:
             folder = resources.files("kernels.opencl")
