@@ -113,7 +113,9 @@ def music(n: int, rng: np.random.Generator, *, impulses: bool) -> list[Series]:
     return segments
 
 
-def make(kind: str, n_segments: int, n_clips: int, sources: list[NDArray[np.float64]]) -> tuple[list[Series], list[Series]]:
+def make(
+    kind: str, n_segments: int, n_clips: int, sources: list[NDArray[np.float64]]
+) -> tuple[list[Series], list[Series]]:
     """Segments and clips of one kind."""
     rng = np.random.default_rng(20)
     if kind == "rough":
@@ -171,7 +173,7 @@ def mismatches(matcher: Matcher, index: ClipIndex, segments: list[Series], clips
 
 
 def check_peer() -> None:
-    """The float64 search used here is the reference."""
+    """Compare the float64 search used here with the reference."""
     rng = np.random.default_rng(1)
     clips, segment = [rng.random(90).astype(np.float32) for _ in range(5)], rng.random(40).astype(np.float32)
     laid = np.zeros((5, 91))
@@ -256,7 +258,7 @@ def measure_growth(program: Program, sources: list[NDArray[np.float64]], clock: 
     """Query, index and memory of growing catalogues, 32 segments."""
     rows = []
     segments, clips = make("energy", 32, max(counts), sources)
-    plan = Plan(25, (10, 5))
+    plan = Plan((25, 8), (10, 8), (10, 5))
     for n in counts:
         matcher = Matcher(program=program, plan=plan)
         index = matcher.index(clips[:n])
@@ -293,7 +295,7 @@ def main() -> None:
     check_peer()
     sources = [energy(clip) for clip in takes()]
     figures: dict = {"device": program.name, "segments": options.segments, "clips": options.clips}
-    segments, clips = make("energy", 48, min(options.clips, 100), sources)
+    segments, clips = make("energy", 48, options.clips, sources)
     ours, theirs = measure_brute(program, segments, clips, clock)
     figures |= {"brute_gterm_per_cpu_s": ours, "numba_gterm_per_cpu_s": theirs, "brute_over_numba_ratio": ours / theirs}
     wrong = 0

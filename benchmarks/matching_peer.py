@@ -1,4 +1,7 @@
-"""Brute force in Numba: the peer that the OpenCL searches are measured against. Four segments a pass, four terms a division."""
+"""Brute force in Numba: the peer that the OpenCL searches are measured against.
+
+Four segments a pass, four terms a division.
+"""
 
 from __future__ import annotations
 
@@ -47,14 +50,54 @@ def largest(
                     w3 = np.float32(x3 % 50) * np.float32(0.02)
                     m0, m1 = m[first + x0 // 50 :], m[first + x1 // 50 :]
                     m2, m3 = m[first + x2 // 50 :], m[first + x3 // 50 :]
-                    a00, a01, a02, a03 = segments[s + 0, f + 0], segments[s + 0, f + 1], segments[s + 0, f + 2], segments[s + 0, f + 3]
-                    s00, s01, s02, s03 = squares[s + 0, f + 0], squares[s + 0, f + 1], squares[s + 0, f + 2], squares[s + 0, f + 3]
-                    a10, a11, a12, a13 = segments[s + 1, f + 0], segments[s + 1, f + 1], segments[s + 1, f + 2], segments[s + 1, f + 3]
-                    s10, s11, s12, s13 = squares[s + 1, f + 0], squares[s + 1, f + 1], squares[s + 1, f + 2], squares[s + 1, f + 3]
-                    a20, a21, a22, a23 = segments[s + 2, f + 0], segments[s + 2, f + 1], segments[s + 2, f + 2], segments[s + 2, f + 3]
-                    s20, s21, s22, s23 = squares[s + 2, f + 0], squares[s + 2, f + 1], squares[s + 2, f + 2], squares[s + 2, f + 3]
-                    a30, a31, a32, a33 = segments[s + 3, f + 0], segments[s + 3, f + 1], segments[s + 3, f + 2], segments[s + 3, f + 3]
-                    s30, s31, s32, s33 = squares[s + 3, f + 0], squares[s + 3, f + 1], squares[s + 3, f + 2], squares[s + 3, f + 3]
+                    a00, a01, a02, a03 = (
+                        segments[s + 0, f + 0],
+                        segments[s + 0, f + 1],
+                        segments[s + 0, f + 2],
+                        segments[s + 0, f + 3],
+                    )
+                    s00, s01, s02, s03 = (
+                        squares[s + 0, f + 0],
+                        squares[s + 0, f + 1],
+                        squares[s + 0, f + 2],
+                        squares[s + 0, f + 3],
+                    )
+                    a10, a11, a12, a13 = (
+                        segments[s + 1, f + 0],
+                        segments[s + 1, f + 1],
+                        segments[s + 1, f + 2],
+                        segments[s + 1, f + 3],
+                    )
+                    s10, s11, s12, s13 = (
+                        squares[s + 1, f + 0],
+                        squares[s + 1, f + 1],
+                        squares[s + 1, f + 2],
+                        squares[s + 1, f + 3],
+                    )
+                    a20, a21, a22, a23 = (
+                        segments[s + 2, f + 0],
+                        segments[s + 2, f + 1],
+                        segments[s + 2, f + 2],
+                        segments[s + 2, f + 3],
+                    )
+                    s20, s21, s22, s23 = (
+                        squares[s + 2, f + 0],
+                        squares[s + 2, f + 1],
+                        squares[s + 2, f + 2],
+                        squares[s + 2, f + 3],
+                    )
+                    a30, a31, a32, a33 = (
+                        segments[s + 3, f + 0],
+                        segments[s + 3, f + 1],
+                        segments[s + 3, f + 2],
+                        segments[s + 3, f + 3],
+                    )
+                    s30, s31, s32, s33 = (
+                        squares[s + 3, f + 0],
+                        squares[s + 3, f + 1],
+                        squares[s + 3, f + 2],
+                        squares[s + 3, f + 3],
+                    )
                     for i in range(64):
                         b0 = m0[i] + w0 * (m0[i + 1] - m0[i])
                         b1 = m1[i] + w1 * (m1[i + 1] - m1[i])

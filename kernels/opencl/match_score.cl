@@ -42,7 +42,7 @@ static int count_starts(const int n_frames, const int n_segment, const int numer
 //   table    rows of the clips, the largest of `fold` neighbouring starts (1, 2, 4 or 8)
 //   amount   (bundle, n_blocks, 2, WIDTH)
 //   largest  (n_segments, n_clips), -1 where no start fits; place beside it
-// One work-item owns one clip and WIDTH segments.
+// One work-item owns one clip and WIDTH segments; neighbours take the same clip, whose rows stay in the cache.
 __kernel void bound_together(
     const int n_clips, const int n_segments, const int n_scales, const int n_blocks, const int n_rows, const int fold,
     __global const int *restrict clip_first,
@@ -57,7 +57,7 @@ __kernel void bound_together(
     __global float *restrict largest,
     __global int *restrict place)
 {
-    const int clip = get_global_id(0), bundle = get_global_id(1);
+    const int bundle = get_global_id(0), clip = get_global_id(1);
     if (clip >= n_clips || bundle * WIDTH >= n_segments)
         return;
     const int columns = clip_stride[clip] / fold;
@@ -146,7 +146,7 @@ __kernel void score_together(
     __global float *restrict largest,
     __global int *restrict place)
 {
-    const int clip = get_global_id(0), bundle = get_global_id(1);
+    const int bundle = get_global_id(0), clip = get_global_id(1);
     if (clip >= n_clips || bundle * WIDTH >= n_segments)
         return;
     __global const float *in = frame + clip_first[clip];
@@ -238,7 +238,7 @@ __kernel void bound_alone(
     __global float *restrict largest,
     __global int *restrict place)
 {
-    const int clip = get_global_id(0), segment = get_global_id(1);
+    const int segment = get_global_id(0), clip = get_global_id(1);
     if (clip >= n_clips || segment >= n_segments)
         return;
     const int columns = clip_stride[clip] / fold;

@@ -14,8 +14,8 @@ from kernels.matching.score import SCALE_DENOMINATOR
 from kernels.opencl.match_tables import Tables
 
 SCALE_BITS = 24
-# what is less, beside clips whose largest value is 1, is left out of sums and counted in the margin: the products of four
-# sums then stay within the range of float
+# what is less, beside clips whose largest value is 1, is left out of sums and counted in the margin: the products
+# of four sums then stay within the range of float
 _QUIET = 1e-7
 _PLAIN = (1e-2, 1e3)  # largest values of segments, beside clips' 1, for which that is little
 _SAFE = (1e-9, 1e9)  # and those for which squares stay within the range
@@ -111,18 +111,28 @@ class Stages:
         n_rows = len(rows(g, tables.numerators))
         if self.plan.is_sparse:
             table = tables.folded(g, fold) if self._n_bounds else tables.dense(1)
-            arguments = (*counts, self._pair_long, n_rows, fold, *clips, self._pair_step, table, *self._pair_lists, *out)
-            program.run("bound_alone", (shape[1], shape[0]), *arguments, is_safe=self.is_safe)
+            arguments = (
+                *counts,
+                self._pair_long,
+                n_rows,
+                fold,
+                *clips,
+                self._pair_step,
+                table,
+                *self._pair_lists,
+                *out,
+            )
+            program.run("bound_alone", shape, *arguments, is_safe=self.is_safe)
         else:
             laid, n_blocks = bundles(self._pair_sums, smallest=self._quiet, width=program.together)
             amount = program.buffer(laid)
-            size = (shape[1], len(laid))
+            size = (len(laid), shape[1])
             if self._n_bounds:
                 steps = (*counts, n_blocks, n_rows, fold, *clips, self._pair_step, tables.folded(g, fold))
                 program.run("bound_together", size, *steps, amount, *out, is_safe=self.is_safe)
             else:
-                steps = (*counts, n_blocks, *clips, self._shift, self._weight, tables.frame)
-                program.run("score_together", size, *steps, amount, *out, is_safe=self.is_safe)
+                frames = (*counts, n_blocks, *clips, self._shift, self._weight, tables.frame)
+                program.run("score_together", size, *frames, amount, *out, is_safe=self.is_safe)
             program.queue.finish()  # `amount` lives until here
         return self.program.read(value, shape, np.float32), self.program.read(place, shape, np.int32)
 
@@ -141,7 +151,9 @@ class Stages:
         out = self.program.room(4 * len(pairs))
         there = (self.program.buffer(pairs), self.program.buffer(place))
         self.program.run(
-            *("probe", (len(pairs),), len(pairs), self._n_bounds, self.fold, *self._clips(), *self._segments(), *self._steps()),
+            "probe",
+            (len(pairs),),
+            *(len(pairs), self._n_bounds, self.fold, *self._clips(), *self._segments(), *self._steps()),
             *(*there, out),
             is_safe=self.is_safe,
             light=True,
@@ -209,7 +221,9 @@ class Stages:
         """Depth first over all pairs."""
         there = (self.program.buffer(pairs), self.program.buffer(least))
         self.program.run(
-            *("refine", (len(pairs),), len(pairs), most),
+            "refine",
+            (len(pairs),),
+            *(len(pairs), most),
             *(*self._clips(), *self._segments(), *self._steps(), *self._tables(), *there, found, count, emitted),
             is_safe=self.is_safe,
         )
@@ -250,7 +264,9 @@ class Stages:
         while True:
             count, passed = self.program.buffer(np.zeros(1, np.int32)), self.program.room(8 * most)
             self.program.run(
-                *("level_first", size, len(pairs), most, *common, *there, count, passed),
+                "level_first",
+                size,
+                *(len(pairs), most, *common, *there, count, passed),
                 is_safe=self.is_safe,
                 light=True,
             )
@@ -263,7 +279,7 @@ class Stages:
         for level in range(1, self._n_bounds):
             count, out = self.program.buffer(np.zeros(1, np.int32)), self.program.room(8 * n)
             self.program.run(
-                *("level_next", (n,), n, level, *common, *there, passed, count, out), is_safe=self.is_safe, light=True
+                "level_next", (n,), *(n, level, *common, *there, passed, count, out), is_safe=self.is_safe, light=True
             )
             n = int(self.program.read(count, (1,), np.int32)[0])
             passed = out
@@ -282,7 +298,9 @@ class Stages:
         passed, n = groups
         common = (*self._clips(), *self._segments(), *self._steps(), *self._tables())
         self.program.run(
-            *("level_last", (n,), n, most, *common, *there, passed, found, count, emitted),
+            "level_last",
+            (n,),
+            *(n, most, *common, *there, passed, found, count, emitted),
             is_safe=self.is_safe,
             light=True,
         )

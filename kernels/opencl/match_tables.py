@@ -8,7 +8,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.matching.blocks import parent, rows
+from kernels.matching.blocks import Rows, parent, rows
 from kernels.matching.plan import Plan, built
 from kernels.opencl.match_program import Program
 
@@ -113,15 +113,23 @@ class Tables:
         self._dense.update(dense)
         self._folded.update(folded)
 
-    def _weights(self, g: int, all_rows: dict) -> tuple[cl.Buffer, int]:
-        """What a row is summed from, and how many of them."""
+    def _weights(self, g: int, all_rows: dict[int, Rows]) -> tuple[cl.Buffer, int]:
+        """Upload what rows are summed from; and how many of them each."""
         if parent(g) in all_rows:
             children = all_rows[g].children(all_rows[parent(g)])
             return self.program.buffer(children), children.shape[1]
         taps = all_rows[g].taps()
         return self.program.buffer(taps), taps.shape[1]
 
-    def _sum(self, g: int, where: dict, all_rows: dict, weights: tuple[cl.Buffer, int], begin: int, end: int) -> None:
+    def _sum(
+        self,
+        g: int,
+        where: dict[int, tuple[cl.Buffer, int]],
+        all_rows: dict[int, Rows],
+        weights: tuple[cl.Buffer, int],
+        begin: int,
+        end: int,
+    ) -> None:
         """Sum the rows of a few clips."""
         table, origin = where[g]
         size = (-(-int(self.stride[begin:end].max()) // self.program.lanes), len(all_rows[g]), end - begin)
