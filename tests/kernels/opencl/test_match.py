@@ -56,7 +56,7 @@ def test_every_plan_answers_as_float64_to_the_bit(program, kind):
             assert Matcher(program=program, plan=plan, by_level=by_level).matches(segments, clips, k=3) == expected
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_shapes_at_random(program, seed):
     rng = np.random.default_rng(seed)
     segments, clips = make("mixed", seed, int(rng.integers(2, 30)), int(rng.integers(9, 40)))
