@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from kernels.matching.blocks import TABLE_MARGIN, block_sums, bundles, lists, margin, rows
-from kernels.matching.plan import BRUTE, BRUTE_SPARSE, PLANS, Plan, built, bytes_a_frame
 from kernels.matching.score import SCALE_NUMERATORS, similarity
 
 
@@ -68,14 +67,3 @@ def test_the_margin_grows_with_length_and_loudness():
     a, b, c = margin(np.array([100.0, 100.0, 200.0]), np.array([100, 200, 100]), np.zeros(3))
     assert 0 < a < b
     assert c == pytest.approx(2 * a, rel=1e-6)
-
-
-def test_plans_say_what_they_need():
-    assert bytes_a_frame(BRUTE, SCALE_NUMERATORS) == 4
-    assert bytes_a_frame(BRUTE_SPARSE, SCALE_NUMERATORS) == 4 * 51
-    assert bytes_a_frame(Plan((25, 8), (10, 8), (5,)), SCALE_NUMERATORS) == 4 * (1 + 17 + 43 + 65)
-    assert built(Plan((50, 8), (10, 8))) == (5, 10, 25, 50)
-    assert len({str(plan) for plan in PLANS}) == len(PLANS)
-    for wrong in ({"pairs": (25, 8)}, {"then": (5,)}, {"pairs": (25, 3), "groups": (10, 8)}):
-        with pytest.raises(ValueError, match="plan: want"):
-            Plan(**wrong)
