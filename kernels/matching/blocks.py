@@ -153,7 +153,8 @@ def block_sums(segments: NDArray[np.float64], n_frames: int) -> NDArray[np.float
     n_blocks = -(-length // n_frames)
     padded = np.zeros((n, n_blocks * n_frames))
     padded[:, :length] = segments
-    return padded.reshape(n, n_blocks, n_frames).sum(-1)
+    sums: NDArray[np.float64] = padded.reshape(n, n_blocks, n_frames).sum(-1)
+    return sums
 
 
 def lists(sums: NDArray[np.float64], *, smallest: NDArray[np.float64]) -> Lists:

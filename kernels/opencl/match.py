@@ -1,4 +1,4 @@
-"""The k best clips of every segment on an OpenCL device: the twin of :func:`kernels.matching.score.reference_matches`."""
+"""The k best clips of every segment on an OpenCL device: twin of :func:`kernels.matching.score.reference_matches`."""
 
 from __future__ import annotations
 
@@ -381,7 +381,7 @@ class _Song:
         self.music_sum = [music_sum(segment) for segment in segments]
 
     def silences(self, index: int, chunk: Chunk, clips: Iterable[int]) -> list[Match]:
-        """The first k of some clips that a segment fits into, where all scores are 0."""
+        """List the first k of some clips that a segment fits into, where all scores are 0."""
         matches: list[Match] = []
         for clip in clips:
             if start_count(len(self.segments[index]), len(chunk.clips[clip]), self.fiftieths[0]):

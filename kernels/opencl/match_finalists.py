@@ -75,7 +75,7 @@ def _refined(
     segment, clip = probed.T
     known[segment, clip] = stages.probe(probed, place[segment, clip])
     done = np.zeros(bound.shape, bool)
-    for wave in (_highest(bound, 2 * k + 8), np.ones(bound.shape, bool)):
+    for wave in (_highest(bound, k + 4), np.ones(bound.shape, bool)):
         least = np.maximum(_kth(known, k), floor)
         chosen = wave & ~done & (bound >= 0) & (bound + slack >= least[:, None])
         pairs = _pairs(chosen)
@@ -83,13 +83,13 @@ def _refined(
         found = stages.best(pairs, np.maximum(least[segment], known[segment, clip]))
         known[segment, clip] = np.maximum(known[segment, clip], found)
         done |= chosen
-        if 2 * k + 8 >= n_clips:
+        if k + 4 >= n_clips:
             break
     return known
 
 
 def _kth(known: NDArray[np.float32], k: int) -> NDArray[np.float32]:
-    """The k-th largest of each row; -1 where there are fewer."""
+    """Find the k-th largest of each row; -1 where there are fewer."""
     n = known.shape[1]
     return np.partition(known, n - k, axis=1)[:, n - k] if k <= n else np.full(len(known), -1, np.float32)
 

@@ -1,4 +1,4 @@
-// Tables of block sums of clips, from frames or from smaller blocks, and the largest of 8 neighbours.
+// Tables of block sums of clips, from frames or from smaller blocks, and the largest of neighbours.
 // See kernels/matching/blocks.py for the rows.
 //
 // A clip has clip_first[c] frames before it and is clip_stride[c] frames long with its zeros at the end (a multiple of
@@ -74,10 +74,10 @@ __kernel void sum_blocks(
     STORE(out + (size_t)(clip_first[clip] - origin) * n_rows + (size_t)row * stride + n, total);
 }
 
-// the largest of 8 neighbours, sorted by n mod 8: out[n mod 8][n div 8] = max of in[n .. n + 7].
-// One work-item owns 64 columns, LANES is not used.
-__kernel void largest_of_8(
-    const int first_clip, const int n_clips, const int n_rows, const int origin, const int in_origin,
+// the largest of `fold` neighbours (1, 2, 4 or 8), sorted by n mod fold: out[n mod fold][n div fold] = max of
+// in[n .. n + fold - 1]. One work-item owns 64 columns, LANES is not used.
+__kernel void largest_of(
+    const int first_clip, const int n_clips, const int n_rows, const int fold, const int origin, const int in_origin,
     __global const int *restrict clip_first,
     __global const int *restrict clip_stride,
     __global const float *restrict in,
@@ -91,19 +91,20 @@ __kernel void largest_of_8(
     if (n >= stride)
         return;
     __global const float *from = in + (size_t)(clip_first[clip] - in_origin) * n_rows + (size_t)row * stride + n;
-    __global float *to = out + (size_t)(clip_first[clip] - origin) * n_rows + (size_t)row * stride + n / 8;
+    __global float *to = out + (size_t)(clip_first[clip] - origin) * n_rows + (size_t)row * stride + n / fold;
     const int left = stride - n;
-    float x[72], best[8][8];
-    for (int i = 0; i < 72; ++i)
-        x[i] = i < left ? from[i] : 0.0f;
-    for (int step = 1; step < 8; step *= 2)
-        for (int i = 0; i + step < 72; ++i)
-            x[i] = x[i] > x[i + step] ? x[i] : x[i + step];
-    for (int r = 0; r < 8; ++r)
-        for (int i = 0; i < 8; ++i)
-            best[r][i] = x[8 * i + r];
-    const int columns = left < 64 ? left / 8 : 8;
-    for (int r = 0; r < 8; ++r)
+    float x[72];
+    if (left >= 72)
+        for (int i = 0; i < 72; ++i)
+            x[i] = from[i];
+    else
+        for (int i = 0; i < 72; ++i)
+            x[i] = i < left ? from[i] : 0.0f;
+    for (int reach = 1; reach < fold; reach *= 2)
+        for (int i = 0; i < 72 - reach; ++i)
+            x[i] = x[i] > x[i + reach] ? x[i] : x[i + reach];
+    const int columns = (left < 64 ? left : 64) / fold;
+    for (int r = 0; r < fold; ++r)
         for (int i = 0; i < columns; ++i)
-            to[r * (stride / 8) + i] = best[r][i];
+            to[r * (stride / fold) + i] = x[fold * i + r];
 }

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib import resources
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
@@ -52,7 +54,12 @@ class Program:
         return f"{device.name.strip()} ({device.platform.name.strip()} {device.driver_version.strip()})"
 
     def run(
-        self, name: str, size: tuple[int, ...], *arguments: object, is_safe: bool = False, light: bool = False
+        self,
+        name: str,
+        size: tuple[int, ...],
+        *arguments: Any,  # noqa: ANN401 (numbers and buffers, mixed)
+        is_safe: bool = False,
+        light: bool = False,
     ) -> None:
         """Start a kernel; the queue keeps the order.
 
@@ -93,7 +100,7 @@ class Program:
             raise cl.MemoryError(f"buffer: want at most {self.device.max_mem_alloc_size} bytes, got {n_bytes}")
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size=max(n_bytes, 16))
 
-    def read(self, buffer: cl.Buffer, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray[np.generic]:
+    def read(self, buffer: cl.Buffer, shape: tuple[int, ...], dtype: type[Any]) -> NDArray[Any]:
         """Wait for the queue and copy the front of a buffer to the host."""
         out = np.zeros(shape, dtype)
         if out.size:
@@ -105,11 +112,13 @@ class Program:
         cl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(content), dst_offset=offset_bytes)
 
     def _program(self, name: str, is_safe: bool) -> cl.Program:
-        files = _INDEX if name in ("sum_frames", "sum_blocks", "largest_of_8") else _SEARCH
+        files = _INDEX if name in ("sum_frames", "sum_blocks", "largest_of") else _SEARCH
         key = (files[0], is_safe and files is _SEARCH)
         if key not in self._built:
             folder = resources.files("kernels.opencl")
             source = "\n".join(folder.joinpath(file).read_text(encoding="utf-8") for file in files)
             options = ["-cl-mad-enable", "-D", f"LANES={self.lanes}", "-D", f"WIDTH={self.together}"]
-            self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[1] else []))
+            with warnings.catch_warnings():  # some compilers talk of vector widths while all is well
+                warnings.simplefilter("ignore", cl.CompilerWarning)
+                self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[1] else []))
         return self._built[key]

@@ -1,4 +1,4 @@
-// From bounds of groups of 8 starts to scores of starts, for chosen pairs of segments and clips. Follows match_score.cl
+// From bounds of groups of starts to scores of starts, for chosen pairs of segments and clips. Follows match_score.cl
 // in one program and shares its definitions.
 //
 // Two ways to the same answers. Depth first: one work-item owns a pair and goes from bound to bound to score in each
@@ -7,7 +7,7 @@
 //
 // Lists of the segments' blocks, one after another for the levels (0 the first bound, then the finer ones, last the
 // frames): first[level * (n_segments + 1) + segment], block, amount; steps of a level begin at level_step[level] and are
-// level_long[level] a scale. The first level's steps are folded by 8, the frames' are the shift alone, with a weight.
+// level_long[level] a scale. The first level's steps are folded, the frames' are the shift alone, with a weight.
 
 // the sums of 8 starts from f0 over a list, by a table's rows
 static float8 sum_of_8(
@@ -69,22 +69,23 @@ static float least_of_8(const float8 sum, const int n)
     __global const float *restrict weight, __global const int *restrict level_step, \
     __global const int *restrict level_long
 #define TABLES \
-    const int n_bounds, const int fold_rows, __global const float *restrict folded, \
+    const int n_bounds, const int fold, const int fold_rows, __global const float *restrict folded, \
     const int rows_1, __global const float *restrict table_1, const int rows_2, __global const float *restrict table_2
 #define STEPS_OF(level, p) (step + level_step[level] + (p) * level_long[level])
 #define LIST_OF(level, segment) (first + (level) * (n_segments + 1) + (segment)), block, amount
 
 // Score one group of each pair: pair (segment, clip), place; out the best score of the group's starts.
 __kernel void probe(
-    const int n_pairs, const int frames_level, CLIPS, SEGMENTS, STEPS,
+    const int n_pairs, const int frames_level, const int fold, CLIPS, SEGMENTS, STEPS,
     __global const int2 *restrict pair, __global const int *restrict place, __global float *restrict out)
 {
     const int id = get_global_id(0);
     if (id >= n_pairs)
         return;
     const int segment = pair[id].x, clip = pair[id].y;
-    const int p = place[id] >> SCALE_BITS, f0 = 8 * (place[id] & ((1 << SCALE_BITS) - 1));
-    const int n = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) - f0;
+    const int p = place[id] >> SCALE_BITS, f0 = fold * (place[id] & ((1 << SCALE_BITS) - 1));
+    const int n_left = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) - f0;
+    const int n = n_left < fold ? n_left : fold;
     const float8 sum = exact_of_8(frame + clip_first[clip] + f0, STEPS_OF(frames_level, p),
         weight + p * level_long[frames_level], LIST_OF(frames_level, segment));
     const float score = music_sum[segment] - least_of_8(sum, n);
@@ -108,14 +109,14 @@ __kernel void refine(
     float wanted = least_score[id], best = -1.0f;
     for (int p = 0; p < n_scales; ++p) {
         const int n_starts = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]);
-        const int n_groups = (n_starts + 7) / 8;
+        const int n_groups = (n_starts + fold - 1) / fold;
         for (int i = 0; i < n_groups; i += LANES) {
             union { VEC v; float lane[LANES]; } bound;
             bound.v = (VEC)(0.0f);
             if (n_bounds > 0) {
                 __global const int2 *steps = STEPS_OF(0, p);
                 __global const float *rows = folded + base * fold_rows + i;
-                const int columns = stride / 8;
+                const int columns = stride / fold;
                 VEC sum = (VEC)(0.0f);
                 for (int j = first[segment]; j < first[segment + 1]; j += 4) {
                     const int2 k0 = steps[block[j]], k1 = steps[block[j + 1]];
@@ -133,7 +134,8 @@ __kernel void refine(
             for (int lane = 0; lane < here; ++lane) {
                 if (a_sum - bound.lane[lane] + slack < wanted)
                     continue;
-                const int f0 = 8 * (i + lane), n = n_starts - f0;
+                const int f0 = fold * (i + lane);
+                const int n = n_starts - f0 < fold ? n_starts - f0 : fold;
                 if (n_bounds > 1 && a_sum + slack - least_of_8(sum_of_8(table_1 + base * rows_1 + f0, stride,
                         STEPS_OF(1, p), LIST_OF(1, segment)), n) < wanted)
                     continue;
@@ -143,7 +145,7 @@ __kernel void refine(
                 union { float8 v; float lane[8]; } exact;
                 exact.v = exact_of_8(frame + base + f0, STEPS_OF(n_bounds, p), weight + p * level_long[n_bounds],
                     LIST_OF(n_bounds, segment));
-                for (int start = 0; start < 8 && start < n; ++start) {
+                for (int start = 0; start < n; ++start) {
                     float score = a_sum - exact.lane[start];
                     score = score > 0.0f ? score : 0.0f;
                     if (most > 0) {
@@ -175,7 +177,7 @@ __kernel void level_first(
     if (id >= n_pairs || p >= n_scales)
         return;
     const int segment = pair[id].x, clip = pair[id].y;
-    const int n_groups = (count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) + 7) / 8;
+    const int n_groups = (count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) + fold - 1) / fold;
     if (i >= n_groups)
         return;
     union { VEC v; float lane[LANES]; } bound;
@@ -183,7 +185,7 @@ __kernel void level_first(
     if (n_bounds > 0) {
         __global const int2 *steps = STEPS_OF(0, p);
         __global const float *rows = folded + (size_t)clip_first[clip] * fold_rows + i;
-        const int columns = clip_stride[clip] / 8;
+        const int columns = clip_stride[clip] / fold;
         VEC sum = (VEC)(0.0f);
         for (int j = first[segment]; j < first[segment + 1]; j += 4) {
             const int2 k0 = steps[block[j]], k1 = steps[block[j + 1]], k2 = steps[block[j + 2]], k3 = steps[block[j + 3]];
@@ -212,8 +214,9 @@ __kernel void level_next(
     if (id >= n_groups)
         return;
     const int segment = pair[in[id].x].x, clip = pair[in[id].x].y;
-    const int p = in[id].y >> SCALE_BITS, f0 = 8 * (in[id].y & ((1 << SCALE_BITS) - 1));
-    const int n = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) - f0;
+    const int p = in[id].y >> SCALE_BITS, f0 = fold * (in[id].y & ((1 << SCALE_BITS) - 1));
+    const int n_left = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) - f0;
+    const int n = n_left < fold ? n_left : fold;
     __global const float *rows = level == 1 ? table_1 : table_2;
     const int n_rows = level == 1 ? rows_1 : rows_2;
     const float8 sum = sum_of_8(rows + (size_t)clip_first[clip] * n_rows + f0, clip_stride[clip], STEPS_OF(level, p),
@@ -233,13 +236,14 @@ __kernel void level_last(
     if (id >= n_groups)
         return;
     const int segment = pair[in[id].x].x, clip = pair[in[id].x].y;
-    const int p = in[id].y >> SCALE_BITS, f0 = 8 * (in[id].y & ((1 << SCALE_BITS) - 1));
-    const int n = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) - f0;
+    const int p = in[id].y >> SCALE_BITS, f0 = fold * (in[id].y & ((1 << SCALE_BITS) - 1));
+    const int n_left = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]) - f0;
+    const int n = n_left < fold ? n_left : fold;
     union { float8 v; float lane[8]; } exact;
     exact.v = exact_of_8(frame + clip_first[clip] + f0, STEPS_OF(n_bounds, p), weight + p * level_long[n_bounds],
         LIST_OF(n_bounds, segment));
     float best = -1.0f;
-    for (int start = 0; start < 8 && start < n; ++start) {
+    for (int start = 0; start < n; ++start) {
         float score = music_sum[segment] - exact.lane[start];
         score = score > 0.0f ? score : 0.0f;
         best = score > best ? score : best;

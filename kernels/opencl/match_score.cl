@@ -5,8 +5,8 @@
 // values differ by more than a thousand). No product of four can leave the range of float, see docs/matching.md.
 // Every operand is positive, so all errors are relative and the host's margin covers any order and contraction.
 //
-// Clips are laid out as in match_index.cl. A candidate group is 8 neighbouring starts, f0 = 8 i .. 8 i + 7; a place is
-// scale * 2^24 + start (or group). Build options: LANES (4, 8, 16), WIDTH (segments a work-item takes together).
+// Clips are laid out as in match_index.cl. A group is `fold` neighbouring starts, f0 = fold i .. fold i + fold - 1; a
+// place is scale * 2^24 + group (a start where fold is 1). Build options: LANES (4, 8, 16), WIDTH (segments a work-item takes together).
 
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
@@ -38,11 +38,11 @@ static int count_starts(const int n_frames, const int n_segment, const int numer
 }
 
 // The largest bound (or score) of each pair of segment and clip, and where: WIDTH segments of like length, all blocks.
-//   step     (n_scales, n_blocks): row and shift of a block; with `fold` = 8, row * 8 + shift mod 8 and shift div 8
-//   table    rows of the clips from `origin` on; with `fold` = 8, of groups, else (1) of starts
+//   step     (n_scales, n_blocks): of a block, row * fold + shift mod fold, and shift div fold
+//   table    rows of the clips, the largest of `fold` neighbouring starts (1, 2, 4 or 8)
 //   amount   (bundle, n_blocks, 2, WIDTH)
 //   largest  (n_segments, n_clips), -1 where no start fits; place beside it
-// One work-item owns one clip and WIDTH segments.
+// One work-item owns one clip and WIDTH segments; neighbours take the same clip, whose rows stay in the cache.
 __kernel void bound_together(
     const int n_clips, const int n_segments, const int n_scales, const int n_blocks, const int n_rows, const int fold,
     __global const int *restrict clip_first,
@@ -57,7 +57,7 @@ __kernel void bound_together(
     __global float *restrict largest,
     __global int *restrict place)
 {
-    const int clip = get_global_id(0), bundle = get_global_id(1);
+    const int bundle = get_global_id(0), clip = get_global_id(1);
     if (clip >= n_clips || bundle * WIDTH >= n_segments)
         return;
     const int columns = clip_stride[clip] / fold;
@@ -78,6 +78,9 @@ __kernel void bound_together(
     }
     for (int p = 0; p < n_scales; ++p) {
         const int n_most = (count_starts(clip_frames[clip], shortest, numerator[p]) + fold - 1) / fold;
+        int n[WIDTH];
+        for (int s = 0; s < WIDTH; ++s)
+            n[s] = (count_starts(clip_frames[clip], frames[s], numerator[p]) + fold - 1) / fold;
         __global const int2 *steps = step + p * n_blocks;
         for (int i = 0; i < n_most; i += LANES) {
             VEC sum[WIDTH];
@@ -98,12 +101,14 @@ __kernel void bound_together(
                         ak[s], ak[2 * WIDTH + s], ak[4 * WIDTH + s], ak[6 * WIDTH + s],
                         ak[WIDTH + s], ak[3 * WIDTH + s], ak[5 * WIDTH + s], ak[7 * WIDTH + s]);
             }
+            const IVEC here = lanes.v + (IVEC)((p << SCALE_BITS) + i);
             #pragma unroll
             for (int s = 0; s < WIDTH; ++s) {
-                const int n = (count_starts(clip_frames[clip], frames[s], numerator[p]) + fold - 1) / fold;
-                const IVEC better = (sum[s] < least[s]) & (lanes.v + i < (IVEC)(n));
-                least[s] = select(least[s], sum[s], better);
-                at[s] = select(at[s], lanes.v + (IVEC)((p << SCALE_BITS) + i), better);
+                IVEC better = sum[s] < least[s];
+                if (i + LANES > n[s])
+                    better &= lanes.v < (IVEC)(n[s] - i);
+                least[s] = better ? sum[s] : least[s];
+                at[s] = better ? here : at[s];
             }
         }
     }
@@ -141,7 +146,7 @@ __kernel void score_together(
     __global float *restrict largest,
     __global int *restrict place)
 {
-    const int clip = get_global_id(0), bundle = get_global_id(1);
+    const int bundle = get_global_id(0), clip = get_global_id(1);
     if (clip >= n_clips || bundle * WIDTH >= n_segments)
         return;
     __global const float *in = frame + clip_first[clip];
@@ -162,6 +167,9 @@ __kernel void score_together(
     }
     for (int p = 0; p < n_scales; ++p) {
         const int n_most = count_starts(clip_frames[clip], shortest, numerator[p]);
+        int n[WIDTH];
+        for (int s = 0; s < WIDTH; ++s)
+            n[s] = count_starts(clip_frames[clip], frames[s], numerator[p]);
         __global const int *steps = step + p * n_blocks;
         __global const float *weights = weight + p * n_blocks;
         for (int i = 0; i < n_most; i += LANES) {
@@ -184,12 +192,14 @@ __kernel void score_together(
                         ak[s], ak[2 * WIDTH + s], ak[4 * WIDTH + s], ak[6 * WIDTH + s],
                         ak[WIDTH + s], ak[3 * WIDTH + s], ak[5 * WIDTH + s], ak[7 * WIDTH + s]);
             }
+            const IVEC here = lanes.v + (IVEC)((p << SCALE_BITS) + i);
             #pragma unroll
             for (int s = 0; s < WIDTH; ++s) {
-                const int n = count_starts(clip_frames[clip], frames[s], numerator[p]);
-                const IVEC better = (sum[s] < least[s]) & (lanes.v + i < (IVEC)(n));
-                least[s] = select(least[s], sum[s], better);
-                at[s] = select(at[s], lanes.v + (IVEC)((p << SCALE_BITS) + i), better);
+                IVEC better = sum[s] < least[s];
+                if (i + LANES > n[s])
+                    better &= lanes.v < (IVEC)(n[s] - i);
+                least[s] = better ? sum[s] : least[s];
+                at[s] = better ? here : at[s];
             }
         }
     }
@@ -228,7 +238,7 @@ __kernel void bound_alone(
     __global float *restrict largest,
     __global int *restrict place)
 {
-    const int clip = get_global_id(0), segment = get_global_id(1);
+    const int segment = get_global_id(0), clip = get_global_id(1);
     if (clip >= n_clips || segment >= n_segments)
         return;
     const int columns = clip_stride[clip] / fold;
@@ -254,8 +264,8 @@ __kernel void bound_alone(
                 ADD_TERMS(sum, b0, b1, b2, b3, a0.x, a1.x, a2.x, a3.x, a0.y, a1.y, a2.y, a3.y);
             }
             const IVEC better = (sum < least) & (lanes.v + i < (IVEC)(n));
-            least = select(least, sum, better);
-            at = select(at, lanes.v + (IVEC)((p << SCALE_BITS) + i), better);
+            least = better ? sum : least;
+            at = better ? lanes.v + (IVEC)((p << SCALE_BITS) + i) : at;
         }
     }
     union { VEC v; float lane[LANES]; } low;

@@ -14,8 +14,8 @@ from kernels.matching.score import SCALE_DENOMINATOR
 from kernels.opencl.match_tables import Tables
 
 SCALE_BITS = 24
-# what is less, beside clips whose largest value is 1, is left out of sums and counted in the margin: the products of four
-# sums then stay within the range of float
+# what is less, beside clips whose largest value is 1, is left out of sums and counted in the margin: the products
+# of four sums then stay within the range of float
 _QUIET = 1e-7
 _PLAIN = (1e-2, 1e3)  # largest values of segments, beside clips' 1, for which that is little
 _SAFE = (1e-9, 1e9)  # and those for which squares stay within the range
@@ -71,11 +71,16 @@ class Stages:
         music_sum = scaled.sum(1)
         dropped = np.where(scaled < quiet[:, None], scaled, 0).sum(1)
         self.margin = margin(music_sum, n_frames, dropped)
-        bounds = [plan.first, *plan.then] if plan.first else []
+        bounds = [plan.groups[0], *plan.then] if plan.groups else []
         self._n_bounds = len(bounds)
+        self._fold = plan.groups[1] if plan.groups else GROUP
         self._sums = [block_sums(scaled, g) for g in (*bounds, 1)]
+        g, self.fold = plan.pairs or (1, 1)
+        self._pair_sums = block_sums(scaled, g)
         self._quiet = quiet
-        self._lay_lists([lists(sums, smallest=quiet) for sums in self._sums])
+        levels = [lists(sums, smallest=quiet) for sums in self._sums]
+        self._first, self._block, self._amount = self._lay_lists(levels)
+        self._pair_lists = self._lay_lists([lists(self._pair_sums, smallest=quiet)])
         self._lay_steps(bounds)
         self._music_sum = program.buffer(music_sum.astype(np.float32))
         self._margin = program.buffer(self.margin)
@@ -97,36 +102,38 @@ class Stages:
             scale * 2^24 + group (or start) of the largest.
         """
         shape = (self.n_segments, len(self.tables))
-        value, place = (self.program.room(4 * shape[0] * shape[1]) for _ in range(2))
-        clips = (self.tables.clip_first, self.tables.clip_stride, self.tables.clip_frames, self._numerator)
+        program, tables = self.program, self.tables
+        value, place = (program.room(4 * shape[0] * shape[1]) for _ in range(2))
+        clips = (tables.clip_first, tables.clip_stride, tables.clip_frames, self._numerator)
         out = (self._music_sum, self._segment_frames, value, place)
-        counts = (shape[1], shape[0], len(self.tables.numerators))
+        counts = (shape[1], shape[0], len(tables.numerators))
+        g, fold = self.plan.pairs or (1, 1)
+        n_rows = len(rows(g, tables.numerators))
         if self.plan.is_sparse:
-            g, fold = (self.plan.first, GROUP) if self._n_bounds else (1, 1)
-            table = self.tables.folded(g) if self._n_bounds else self.tables.dense(1)
-            self.program.run(
-                *("bound_alone", (shape[1], shape[0]), *counts, self._longest[0], len(rows(g, self.tables.numerators))),
-                *(fold, *clips, self._step, table, self._first, self._block, self._amount, *out),
-                is_safe=self.is_safe,
+            table = tables.folded(g, fold) if self._n_bounds else tables.dense(1)
+            arguments = (
+                *counts,
+                self._pair_long,
+                n_rows,
+                fold,
+                *clips,
+                self._pair_step,
+                table,
+                *self._pair_lists,
+                *out,
             )
+            program.run("bound_alone", shape, *arguments, is_safe=self.is_safe)
         else:
-            laid, n_blocks = bundles(self._sums[0], smallest=self._quiet, width=self.program.together)
-            amount = self.program.buffer(laid)
-            size = (shape[1], len(laid))
+            laid, n_blocks = bundles(self._pair_sums, smallest=self._quiet, width=program.together)
+            amount = program.buffer(laid)
+            size = (len(laid), shape[1])
             if self._n_bounds:
-                n_rows = len(rows(self.plan.first, self.tables.numerators))
-                self.program.run(
-                    *("bound_together", size, *counts, n_blocks, n_rows, GROUP, *clips, self._step),
-                    *(self.tables.folded(self.plan.first), amount, *out),
-                    is_safe=self.is_safe,
-                )
+                steps = (*counts, n_blocks, n_rows, fold, *clips, self._pair_step, tables.folded(g, fold))
+                program.run("bound_together", size, *steps, amount, *out, is_safe=self.is_safe)
             else:
-                self.program.run(
-                    *("score_together", size, *counts, n_blocks, *clips, self._shift, self._weight),
-                    *(self.tables.frame, amount, *out),
-                    is_safe=self.is_safe,
-                )
-            self.program.queue.finish()  # `amount` lives until here
+                frames = (*counts, n_blocks, *clips, self._shift, self._weight, tables.frame)
+                program.run("score_together", size, *frames, amount, *out, is_safe=self.is_safe)
+            program.queue.finish()  # `amount` lives until here
         return self.program.read(value, shape, np.float32), self.program.read(place, shape, np.int32)
 
     def probe(self, pairs: NDArray[np.int32], place: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -144,7 +151,9 @@ class Stages:
         out = self.program.room(4 * len(pairs))
         there = (self.program.buffer(pairs), self.program.buffer(place))
         self.program.run(
-            *("probe", (len(pairs),), len(pairs), self._n_bounds, *self._clips(), *self._segments(), *self._steps()),
+            "probe",
+            (len(pairs),),
+            *(len(pairs), self._n_bounds, self.fold, *self._clips(), *self._segments(), *self._steps()),
             *(*there, out),
             is_safe=self.is_safe,
             light=True,
@@ -212,7 +221,9 @@ class Stages:
         """Depth first over all pairs."""
         there = (self.program.buffer(pairs), self.program.buffer(least))
         self.program.run(
-            *("refine", (len(pairs),), len(pairs), most),
+            "refine",
+            (len(pairs),),
+            *(len(pairs), most),
             *(*self._clips(), *self._segments(), *self._steps(), *self._tables(), *there, found, count, emitted),
             is_safe=self.is_safe,
         )
@@ -248,12 +259,14 @@ class Stages:
         """Go through the bounds, keeping the groups that pass; None where they do not fit and could be fewer."""
         most = _LEVEL_BYTES // 8
         common = (*self._clips(), *self._segments(), *self._steps(), *self._tables())
-        longest = -(-int(self.tables.frames[pairs[:, 1]].max()) // GROUP)
+        longest = -(-int(self.tables.frames[pairs[:, 1]].max()) // self._fold)
         size = (-(-longest // self.program.lanes), len(self.tables.numerators), len(pairs))
         while True:
             count, passed = self.program.buffer(np.zeros(1, np.int32)), self.program.room(8 * most)
             self.program.run(
-                *("level_first", size, len(pairs), most, *common, *there, count, passed),
+                "level_first",
+                size,
+                *(len(pairs), most, *common, *there, count, passed),
                 is_safe=self.is_safe,
                 light=True,
             )
@@ -266,7 +279,7 @@ class Stages:
         for level in range(1, self._n_bounds):
             count, out = self.program.buffer(np.zeros(1, np.int32)), self.program.room(8 * n)
             self.program.run(
-                *("level_next", (n,), n, level, *common, *there, passed, count, out), is_safe=self.is_safe, light=True
+                "level_next", (n,), *(n, level, *common, *there, passed, count, out), is_safe=self.is_safe, light=True
             )
             n = int(self.program.read(count, (1,), np.int32)[0])
             passed = out
@@ -285,19 +298,23 @@ class Stages:
         passed, n = groups
         common = (*self._clips(), *self._segments(), *self._steps(), *self._tables())
         self.program.run(
-            *("level_last", (n,), n, most, *common, *there, passed, found, count, emitted),
+            "level_last",
+            (n,),
+            *(n, most, *common, *there, passed, found, count, emitted),
             is_safe=self.is_safe,
             light=True,
         )
         self.program.queue.finish()
 
-    def _lay_lists(self, all_lists: list[Lists]) -> None:
-        """Put the lists of all levels one after another."""
-        starts = np.cumsum([0, *(len(entry.block) for entry in all_lists)])
-        first = [entry.first + start for entry, start in zip(all_lists, starts.tolist(), strict=False)]
-        self._first = self.program.buffer(np.concatenate(first).astype(np.int32))
-        self._block = self.program.buffer(np.concatenate([entry.block for entry in all_lists]))
-        self._amount = self.program.buffer(np.concatenate([entry.amount for entry in all_lists]))
+    def _lay_lists(self, levels: list[Lists]) -> tuple[cl.Buffer, cl.Buffer, cl.Buffer]:
+        """Put the lists of some levels one after another."""
+        starts = np.cumsum([0, *(len(level.block) for level in levels)])
+        first = [level.first + start for level, start in zip(levels, starts.tolist(), strict=False)]
+        return (
+            self.program.buffer(np.concatenate(first).astype(np.int32)),
+            self.program.buffer(np.concatenate([level.block for level in levels])),
+            self.program.buffer(np.concatenate([level.amount for level in levels])),
+        )
 
     def _lay_steps(self, bounds: list[int]) -> None:
         """Put the steps of all levels one after another, the first folded; and the weights of frames."""
@@ -308,8 +325,10 @@ class Stages:
         ]
         frames = steps[-1]
         if bounds:
-            row, shift = steps[0][..., 0], steps[0][..., 1]
-            steps[0] = np.stack([row * GROUP + shift % GROUP, shift // GROUP], -1)
+            steps[0] = _folded(steps[0], self._fold)
+        pair_step = rows((self.plan.pairs or (1, 1))[0], numerators).steps(-(-self._pair_sums.shape[1] // 4) * 4)
+        self._pair_long = pair_step.shape[1]
+        self._pair_step = self.program.buffer(_folded(pair_step, self.fold))
         self._longest = [step.shape[1] for step in steps]
         starts = np.cumsum([0, *(step.shape[0] * step.shape[1] for step in steps)])[:-1]
         self._step = self.program.buffer(np.concatenate([step.reshape(-1, 2) for step in steps]).astype(np.int32))
@@ -340,10 +359,16 @@ class Stages:
         """Arguments of the tables; the clips themselves stand in where a plan has none."""
         tables, plan = self.tables, self.plan
         unused = (0, tables.frame)
-        first = (len(rows(plan.first, tables.numerators)), tables.folded(plan.first)) if plan.first else unused
+        first = (len(rows(plan.groups[0], tables.numerators)), tables.folded(*plan.groups)) if plan.groups else unused
         finer = [(len(rows(g, tables.numerators)), tables.dense(g)) for g in plan.then]
         finer += [unused] * (2 - len(finer))
-        return (self._n_bounds, *first, *finer[0], *finer[1])
+        return (self._n_bounds, self._fold, *first, *finer[0], *finer[1])
+
+
+def _folded(steps: NDArray[np.int32], fold: int) -> NDArray[np.int32]:
+    """Rows and shifts of a table of groups, from those of starts."""
+    row, shift = steps[..., 0], steps[..., 1]
+    return np.stack([row * fold + shift % fold, shift // fold], -1)
 
 
 def wants_safe(tables: Tables, segment_max: float) -> bool | None:

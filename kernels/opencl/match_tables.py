@@ -8,7 +8,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.matching.blocks import parent, rows
+from kernels.matching.blocks import Rows, parent, rows
 from kernels.matching.plan import Plan, built
 from kernels.opencl.match_program import Program
 
@@ -50,7 +50,7 @@ class Tables:
             program.buffer(array) for array in (self.first, self.stride, self.frames, flat)
         )
         self._dense: dict[int, cl.Buffer] = {}
-        self._folded: dict[int, cl.Buffer] = {}
+        self._folded: dict[tuple[int, int], cl.Buffer] = {}
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -58,7 +58,7 @@ class Tables:
     @property
     def n_bytes(self) -> int:
         """Device memory of the clips and of all tables built so far."""
-        n_rows = sum(len(rows(g, self.numerators)) for g in (*self._dense, *self._folded))
+        n_rows = sum(len(rows(g, self.numerators)) for g in (*self._dense, *(g for g, _ in self._folded)))
         n_tables = len(self._dense) + len(self._folded)
         return 4 * (self.n_frames * (1 + n_rows) + self._slack * (1 + n_tables)) + 12 * len(self)
 
@@ -66,9 +66,9 @@ class Tables:
         """Table of blocks of so many frames, start by start."""
         return self._dense[n_frames]
 
-    def folded(self, n_frames: int) -> cl.Buffer:
-        """Table of the largest of 8 starts."""
-        return self._folded[n_frames]
+    def folded(self, n_frames: int, starts: int) -> cl.Buffer:
+        """Table of the largest of neighbouring starts."""
+        return self._folded[n_frames, starts]
 
     def build(self, plan: Plan) -> None:
         """Build the tables a plan reads and that are not there yet.
@@ -78,13 +78,13 @@ class Tables:
         cl.MemoryError
             If the device's memory does not suffice; what was there before is kept.
         """
-        keep = [g for g in plan.kept if g not in self._dense]
-        fold = [g for g in (plan.first,) if g and g not in self._folded]
+        keep = [g for g in plan.dense if g not in self._dense]
+        fold = [entry for entry in plan.folded if entry not in self._folded]
         if not keep and not fold:
             return
         all_rows = {g: rows(g, self.numerators) for g in built(plan)}
         dense = {g: self._table(len(all_rows[g])) for g in keep}
-        folded = {g: self._table(len(all_rows[g])) for g in fold}
+        folded = {(g, starts): self._table(len(all_rows[g])) for g, starts in fold}
         there = {**self._dense, **dense}
         missing = [g for g in all_rows if g in keep or g not in self._dense]
         # a batch of clips at a time, so that small blocks are still in the cache when larger ones are summed from them
@@ -99,29 +99,37 @@ class Tables:
             where = {g: (there[g], 0) if g in there else (scratch[g], batch_first) for g in all_rows}
             for g in missing:
                 self._sum(g, where, all_rows, weights[g], begin, end)
-            for g in fold:
+            for g, starts in fold:
                 table, origin = where[g]
                 widest_clip = int(self.stride[begin:end].max())
                 self.program.run(
-                    "largest_of_8",
+                    "largest_of",
                     (-(-widest_clip // 64), len(all_rows[g]), end - begin),
-                    *(begin, end - begin, len(all_rows[g]), 0, origin),
-                    *(self.clip_first, self.clip_stride, table, folded[g]),
+                    *(begin, end - begin, len(all_rows[g]), starts, 0, origin),
+                    *(self.clip_first, self.clip_stride, table, folded[g, starts]),
                     light=True,
                 )
         self.program.queue.finish()
         self._dense.update(dense)
         self._folded.update(folded)
 
-    def _weights(self, g: int, all_rows: dict) -> tuple[cl.Buffer, int]:
-        """What a row is summed from, and how many of them."""
+    def _weights(self, g: int, all_rows: dict[int, Rows]) -> tuple[cl.Buffer, int]:
+        """Upload what rows are summed from; and how many of them each."""
         if parent(g) in all_rows:
             children = all_rows[g].children(all_rows[parent(g)])
             return self.program.buffer(children), children.shape[1]
         taps = all_rows[g].taps()
         return self.program.buffer(taps), taps.shape[1]
 
-    def _sum(self, g: int, where: dict, all_rows: dict, weights: tuple[cl.Buffer, int], begin: int, end: int) -> None:
+    def _sum(
+        self,
+        g: int,
+        where: dict[int, tuple[cl.Buffer, int]],
+        all_rows: dict[int, Rows],
+        weights: tuple[cl.Buffer, int],
+        begin: int,
+        end: int,
+    ) -> None:
         """Sum the rows of a few clips."""
         table, origin = where[g]
         size = (-(-int(self.stride[begin:end].max()) // self.program.lanes), len(all_rows[g]), end - begin)
