@@ -24,6 +24,7 @@ CUTOFF_HZ = 12.0
 _LEAST_M, _LEAST_QUATERNION = 0.015, 0.05
 _TURN_M_PER_S2, _TURN_RAD_PER_S2 = 30.0, 100.0
 _MAX_OUTLIER_RATIO = 0.05
+_MOST_BAD = 5
 # Exchanges of a network after which the fifth of nine is their median (Devillard, 1998).
 _NETWORK = "12 45 78 01 34 67 12 45 78 03 58 47 36 14 25 47 42 64 42"  # pairs of places, smaller to the first
 
@@ -121,7 +122,9 @@ def find_outliers(
     sensor usually does, and than five times what it does within 20 frames, so that fast turns are not taken for
     outliers; but never within 15 mm, or 0.05 in the quaternion,
     nor within what 30 m/s² and 100 rad/s² do in two frames. The first and last four frames are held against a line
-    through the medians next to them, four times as loosely: an outlier at an end must not vouch for itself.
+    through the medians next to them, four times as loosely: an outlier at an end must not vouch for
+    itself. Nor must one that stands alone among bad ones, over which lines would be drawn from it: where five of the
+    eight around an entry are bad, it is one too.
     """
     is_outlier = np.zeros_like(is_usable)
     # at a turn the median of nine lies as far off as the body gets in two frames
@@ -139,6 +142,7 @@ def find_outliers(
             least[:4], least[-4:] = 4 * floor, 4 * floor
             found |= away > np.maximum(least, np.maximum(6.0 * usual, 5.0 * near))
         found &= is_good
+        found |= is_good & (_around(~is_good | found) >= _MOST_BAD)
         if not found.any():
             break
         is_outlier |= found
@@ -154,6 +158,14 @@ def _expected(series: Float) -> Float:
     middle[3::-1] = middle[4] - step * (middle[8] - middle[4]) / 4.0
     middle[-4:] = middle[-5] + step * (middle[-5] - middle[-9]) / 4.0
     return middle
+
+
+def _around(is_bad: Bools) -> NDArray[np.int64]:
+    """Count the bad ones (F, S) within four frames of each entry."""
+    total = np.concatenate([np.zeros((5, is_bad.shape[1]), np.int64), np.cumsum(is_bad, axis=0)])
+    last = total[np.minimum(np.arange(len(is_bad)) + 9, len(total) - 1)]
+    count: NDArray[np.int64] = last - total[: len(is_bad)]
+    return count
 
 
 def _nearby(away: Float) -> Float:

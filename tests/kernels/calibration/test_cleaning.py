@@ -115,3 +115,15 @@ def test_slow_trackers_raise_no_alarm():
     body = suit.make_body(4)
     made = suit.record(body, suit.range_of_motion(4, n_frames=2000, frame_rate_hz=30.0), seed=4)
     assert clean(made.recording).findings == ()
+
+
+def test_a_lone_entry_among_outliers_is_not_believed():
+    rng = np.random.default_rng(0)
+    place = np.zeros((300, 1, 3))
+    place[100:112, 0] = 0.3 + 0.15 * rng.normal(size=(12, 3))
+    still = np.tile(rotation.IDENTITY, (300, 1, 1))
+    is_usable = np.ones((300, 1), bool)
+    is_usable[[102, 103, 104, 105, 107, 108, 109]] = False
+    found = find_outliers(place, still, is_usable, frame_rate_hz=120.0)
+    assert (found | ~is_usable)[100:112].all()
+    assert found[:90].sum() == found[120:].sum() == 0
