@@ -1,0 +1,1 @@
+"""From the sensors of a suit to a skeleton and its poses."""
