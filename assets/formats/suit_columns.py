@@ -11,7 +11,6 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -244,8 +243,3 @@ def _shown(data: bytes) -> str:
 def column(columns: Columns, *spellings: str) -> str | None:
     """Name of the first spelling that the file has."""
     return next((name for name in spellings if name in columns.names), None)
-
-
-def arrow_table(values: dict[str, Any]) -> pa.Table:
-    """Make a table of columns."""
-    return pa.table(values)

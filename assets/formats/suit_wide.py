@@ -75,7 +75,7 @@ def parse(columns: Columns, own: dict[str, str] | None = None, *, unit: str = "a
     units = {placed_at[s][c][1] for s in stations for c in "xyz"}
     scale, word = _metres(units, placed, sensors, unit)
     notes += [word] if word else []
-    valid = np.isfinite(turned).all(-1) & np.isfinite(placed).all(-1)
+    valid = np.isfinite(np.concatenate([turned, placed], -1)).all(-1)
     seen = timeline.collapse(time_s, np.concatenate([turned, placed], -1))
     if len(seen.row) < 0.95 * len(time_s):
         notes.append(f"{len(time_s) - len(seen.row)} of {len(time_s)} rows repeat what was said and are left out")
