@@ -181,8 +181,8 @@ def _parquet(path: Path, name: str) -> Columns:
         raise FormatError(
             name, 0, f"want a whole Parquet file, got one that ends early: {said}; copy it again"
         ) from error
-    said = {k.decode(): v.decode("utf-8", "replace") for k, v in (table.schema.metadata or {}).items()}
-    return Columns(name, _lowered(table, name), 0, said)
+    told = {k.decode(): v.decode("utf-8", "replace") for k, v in (table.schema.metadata or {}).items()}
+    return Columns(name, _lowered(table, name), 0, told)
 
 
 def parse_csv(data: bytes, path: str = "") -> Columns:

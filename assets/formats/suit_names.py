@@ -55,7 +55,8 @@ def name_sensors(names: Sequence[str], own: Mapping[str, str] | None = None) -> 
     -------
     tuple of str, str
         Ours, in the file's order, a name that tells nothing as it was; and a word on what was assumed, or nothing.
-        Seventeen stations that are only numbered are taken in the order of :data:`~kernels.calibration.records.SENSORS`.
+        Seventeen stations that are only numbered are taken in the order of
+        :data:`~kernels.calibration.records.SENSORS`.
 
     Raises
     ------

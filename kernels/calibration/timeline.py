@@ -1,8 +1,8 @@
 """When the samples of a tracker were taken, and what it would have said at even times.
 
-A tracker samples at an even rate; the computer that writes them down is told late, now and then many at once. Times that
-crowd together are therefore times of arrival: the samples are counted, and the earliest arrivals tell the rate and which
-samples were lost. Times that only waver are taken at their word, and the stream is interpolated.
+A tracker samples at an even rate; the computer that writes them down is told late, now and then many at once. Times
+that crowd together are therefore times of arrival: the samples are counted, and the earliest arrivals tell the rate and
+which samples were lost. Times that only waver are taken at their word, and the stream is interpolated.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def onto_grid(
         NaN and not valid at places no sample is for. Uneven streams are interpolated between valid neighbours no more
         than two and a half steps apart, rotations along the shortest arc; others are only put in their places.
     """
-    g, (f, s) = line.n_places, is_valid.shape
+    g, s = line.n_places, is_valid.shape[1]
     position, turned = np.full((g, s, 3), np.nan), np.full((g, s, 4), np.nan)
     valid = np.zeros((g, s), bool)
     if line.kind != "uneven":
