@@ -24,9 +24,7 @@ CUTOFF_HZ = 12.0
 _NORM_3D, _NORM_4D = 1.538, 1.0  # median length of a vector of independent normal components, in their deviation
 _MAX_OUTLIER_RATIO = 0.05
 # Exchanges of a network after which the fifth of nine is their median (Devillard, 1998).
-_NETWORK = (
-    "12 45 78 01 34 67 12 45 78 03 58 47 36 14 25 47 42 64 42"  # pairs of places, smaller to the first
-)
+_NETWORK = "12 45 78 01 34 67 12 45 78 03 58 47 36 14 25 47 42 64 42"  # pairs of places, smaller to the first
 
 
 def clean(recording: Recording, *, cutoff_hz: float = CUTOFF_HZ) -> Cleaned:

@@ -86,6 +86,7 @@ _FAMILIES: dict[str, dict[str, tuple[str, ...]]] = {
     ),
     "unreal": _family("pelvis head", "clavicle upperarm lowerarm hand", "thigh calf foot ball/toe"),
     "biped": _family("pelvis/hip head", "clavicle upperarm forearm hand", "thigh calf foot toe0/toebase/toe"),
+    "suit": _family("pelvis head", "shoulder upperarm forearm hand", "thigh shank foot toe"),
     "optitrack": _family("hip/hips head", "shoulder uarm farm hand", "thigh shin foot toe"),
     "mmd": _family("下半身/腰 頭", "肩 腕 ひじ/肘 手首", "足 ひざ/膝 足首 つま先/足先ex"),
 }

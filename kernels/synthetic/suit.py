@@ -353,7 +353,9 @@ def _soft_tissue(seed: int, motion: Motion, bone_xyz_m: Float, wobble_m: float) 
         speed += (-acceleration[t] - 2 * damping * omega * speed - omega**2 * shaken[t - 1]) / rate
         shaken[t] = shaken[t - 1] + speed / rate
     for k, name in enumerate(SENSORS):
-        bent = np.sin(rotation.log(motion.local_wxyz[:, k])) @ rng.normal(size=(3, 3))
+        angle = rotation.log(motion.local_wxyz[:, k])
+        far = np.sin(np.sqrt(np.sum(angle**2, axis=-1, keepdims=True)))
+        bent = far * rng.normal(size=3) + 0.5 * np.sin(angle) @ rng.normal(size=(3, 3))
         slid = bent / max(float(np.sqrt(np.mean(np.sum(bent**2, -1)))), 1e-9)
         shook = shaken[:, k] / max(float(np.sqrt(np.mean(np.sum(shaken[:, k] ** 2, -1)))), 1e-9)
         both = 0.85 * slid + 0.5 * shook

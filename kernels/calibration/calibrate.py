@@ -1,0 +1,58 @@
+"""A cleaned recording becomes a calibrated body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.calibration.joints import PairSolution, solve_joints
+from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, JointEstimate
+from kernels.types import Float
+
+
+def calibrate(cleaned: Cleaned) -> Calibration:
+    """Find the joints of a body from its sensors.
+
+    Parameters
+    ----------
+    cleaned : Cleaned of the 17 sensors in their order
+
+    Returns
+    -------
+    Calibration
+    """
+    pairs = solve_joints(cleaned)
+    in_parent = np.stack([pair.in_parent_m for pair in pairs])
+    in_child = np.stack([pair.in_child_m for pair in pairs])
+    length = bone_lengths(in_parent, in_child)
+    joints = tuple(
+        _estimate(name, pair, in_parent[k], in_child[k], float(length[k]))
+        for k, (name, pair) in enumerate(zip(JOINTS, pairs, strict=True))
+    )
+    return Calibration(joints, cleaned.findings, np.stack([pair.residual_m for pair in pairs], axis=1))
+
+
+def bone_lengths(in_parent_sensor_m: Float, in_child_sensor_m: Float) -> Float:
+    """Distance from the parent segment's own joint to each joint, (16,) metres; midway between the hips for the pelvis."""
+    hips = [JOINTS.index("l_thigh"), JOINTS.index("r_thigh")]
+    start = np.concatenate([in_parent_sensor_m[hips].mean(axis=0)[None], in_child_sensor_m])
+    way = in_parent_sensor_m - start[list(PARENT[1:])]
+    length: Float = np.sqrt(np.sum(way * way, axis=-1))
+    return length
+
+
+def _estimate(name: str, pair: PairSolution, in_parent: Float, in_child: Float, length_m: float) -> JointEstimate:
+    used = pair.weight > 0
+    return JointEstimate(
+        joint=name,
+        parent=SENSORS[PARENT[SENSORS.index(name)]],
+        length_m=length_m,
+        in_parent_sensor_m=in_parent,
+        in_child_sensor_m=in_child,
+        confidence="high" if pair.rank == 3 else "axis-unobserved" if pair.rank == 2 else "none",
+        rank=pair.rank,
+        residual_rms_m=float(np.sqrt(np.mean(pair.residual_m[used] ** 2))) if used.any() else float("nan"),
+        residual_sigma_m=pair.sigma_m,
+        conditioning=float(np.sqrt((2 - pair.spread[-1]) / max(pair.spread[-1], 1e-12))),
+        range_of_motion_rad=np.sqrt(2 * np.maximum(pair.spread, 0)),
+        n_frames=int(used.sum()),
+    )
