@@ -4,7 +4,6 @@ import difflib
 import json
 import shutil
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,32 +17,15 @@ from assets.sources import Request, Song
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
+from pipelines.files import write_beside
 from pipelines.freshness import Freshness
-from pipelines.lake import write_beside
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
+from pipelines.files import StudioError
+from pipelines.resources import StudioFolder
 from pipelines.web import existing
 from schemas.music import SONG
 
-DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
 LONGEST_LIST = 40
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a command came to.
-
-    Parameters
-    ----------
-    status : exit status
-    facts : what ``--json`` prints
-    report : what a person reads on standard output
-    troubles : refused inputs and failures, one line each, for standard error
-    """
-
-    status: int
-    facts: dict[str, Any]
-    report: str = ""
-    troubles: Sequence[str] = field(default_factory=tuple)
 
 
 class _Session:

@@ -6,6 +6,7 @@ import dagster as dg
 
 from pipelines import jobs, schedules, sensors
 from pipelines.collection import ASSETS, freshness
+from pipelines.calibrate import PoseSolvers
 from pipelines.io_managers import EarlierTables, LakeIOManager, StageIOManager
 from pipelines.resources import NoProgress, StudioFolder, pair_distance, studio_from_environment
 
@@ -25,6 +26,7 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         "earlier": EarlierTables(folder.lake),
         "progress": NoProgress(),
         "pair_distance": dg.ResourceDefinition(lambda _: pair_distance(folder.settings().opencl)),
+        "solvers": dg.ResourceDefinition(lambda _: PoseSolvers(folder.settings().opencl)),
         "lake": LakeIOManager(folder.lake, state),
         "stage": StageIOManager(folder, state),
     }

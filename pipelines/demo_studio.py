@@ -11,8 +11,8 @@ from assets.formats.audio import Audio
 from kernels.synthetic import rigs
 from kernels.synthetic.dancer import MOVES, Take, take
 from kernels.synthetic.music import drum_machine_song
-from pipelines.lake import write_beside
-from pipelines.resources import StudioError
+from pipelines.files import write_beside
+from pipelines.files import StudioError
 
 SONG = "drum_machine"
 TEMPO_BPM = 116.0

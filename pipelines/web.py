@@ -12,8 +12,9 @@ from pathlib import Path
 from types import FrameType
 
 from pipelines.build import open_instance
-from pipelines.lake import why
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.files import why
+from pipelines.files import StudioError
+from pipelines.resources import StudioFolder
 
 
 def serve(root: Path, *, host: str, port: int) -> int:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from schemas import choreography, graph, motion, music
+from schemas import calibration, choreography, graph, motion, music
 from schemas.table import Table
 
 TABLES: dict[str, Table] = {
     value.name: value
-    for module in (motion, music, graph, choreography)
+    for module in (motion, calibration, music, graph, choreography)
     for value in vars(module).values()
     if isinstance(value, Table)
 }

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from assets.formats.suit_columns import Columns, column
 from assets.formats.suit_names import name_sensors
@@ -100,7 +101,15 @@ def parse(columns: Columns, own: dict[str, str] | None = None) -> Suit:
         raise columns.error(None, str(error)) from error
     notes += notes_on_time(line, f)
     position, turned, valid = timeline.onto_grid(line, at_s, position, turned, valid)
-    return Suit(Recording(line.rate_hz, sensors, position, turned, valid), first_frame, scale, tuple(notes))
+    return Suit(kept(line.rate_hz, sensors, position, turned, valid), first_frame, scale, tuple(notes))
+
+
+def kept(
+    rate_hz: float, sensors: tuple[str, ...], position: Float, turned: Float, valid: NDArray[np.bool_]
+) -> Recording:
+    """Make a recording of the sensors that have a name."""
+    k = [i for i, name in enumerate(sensors) if name]
+    return Recording(rate_hz, tuple(sensors[i] for i in k), position[:, k], turned[:, k], valid[:, k])
 
 
 def _needed(columns: Columns) -> tuple[str, list[str], list[str], float]:

@@ -49,12 +49,13 @@ def name_sensors(names: Sequence[str], own: Mapping[str, str] | None = None) -> 
     Parameters
     ----------
     names : as the file has them, each once
-    own : the user's table, name in the file to ours; wins
+    own : the user's table, name in the file to ours, or to nothing where it is to be left out; wins
 
     Returns
     -------
     tuple of str, str
-        Ours, in the file's order, a name that tells nothing as it was; and a word on what was assumed, or nothing.
+        Ours, in the file's order, empty for one to be left out, a name that tells nothing as it was; and a word on what
+        was assumed, or nothing.
         Seventeen stations that are only numbered are taken in the order of
         :data:`~kernels.calibration.records.SENSORS`.
 
@@ -65,7 +66,7 @@ def name_sensors(names: Sequence[str], own: Mapping[str, str] | None = None) -> 
     """
     own = own or {}
     for name, ours in own.items():
-        if ours not in SENSORS:
+        if ours and ours not in SENSORS:
             raise ValueError(f"sensors: want one of {', '.join(SENSORS)}, got {ours!r} for {name!r}; mend [sensors]")
     said = ""
     numbers = sorted((int(m[1]), name) for name in names if (m := re.fullmatch(r"\D*?(\d+)", name)))
@@ -82,8 +83,8 @@ def name_sensors(names: Sequence[str], own: Mapping[str, str] | None = None) -> 
         )
     found: dict[str, str] = {}
     for name in names:
-        ours = own.get(name) or sensor_of(name) or name
-        if ours in found.values():
+        ours = own[name] if name in own else sensor_of(name) or name
+        if ours and ours in found.values():
             twin = next(n for n, o in found.items() if o == ours)
             raise ValueError(f"sensors: want each once, got {twin!r} and {name!r}, both {ours}; rename one of them")
         found[name] = ours
@@ -94,4 +95,7 @@ def unknown_sensor(name: str) -> str:
     """Say what to do about a sensor that is none of the suit's."""
     near = difflib.get_close_matches(name, SENSORS, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(SENSORS)}"
-    return f"sensor {name!r}: want a sensor of the suit; {hint} Rename it, or say which it is in odori.toml, [sensors]"
+    return (
+        f"sensor {name!r}: want a sensor of the suit ({hint}); rename it, or say in odori.toml, [sensors], which it is, "
+        f'or "{name}" = "" to leave it out'
+    )

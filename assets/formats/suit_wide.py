@@ -11,10 +11,10 @@ import re
 import numpy as np
 
 from assets.formats.suit_columns import Columns, column
-from assets.formats.suit_long import METRES_PER_UNIT, SECONDS, Suit, notes_on_time
+from assets.formats.suit_long import METRES_PER_UNIT, SECONDS, Suit, kept, notes_on_time
 from assets.formats.suit_names import name_sensors
 from kernels.calibration import timeline
-from kernels.calibration.records import SENSORS, Recording
+from kernels.calibration.records import SENSORS
 from kernels.types import Float
 
 _UNIT = "(?:_(?P<unit>m|cm|mm|in|inch))?"
@@ -89,7 +89,7 @@ def parse(columns: Columns, own: dict[str, str] | None = None, *, unit: str = "a
         raise columns.error(None, str(error)) from error
     notes += notes_on_time(line, len(rows))
     arrays = timeline.onto_grid(line, at_s, scale * placed[rows], turned[rows], valid[rows])
-    return Suit(Recording(line.rate_hz, sensors, *arrays), 0, scale, tuple(notes))
+    return Suit(kept(line.rate_hz, sensors, *arrays), 0, scale, tuple(notes))
 
 
 def _stations(names: list[str], patterns: tuple[re.Pattern[str], ...]) -> dict[str, dict[str, tuple[str, str]]]:

@@ -14,7 +14,8 @@ import pytest
 
 from pipelines import build as building
 from pipelines.collection import freshness
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.files import StudioError
+from pipelines.resources import StudioFolder
 
 
 def ran(outcome):
