@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from kernels.calibration.body_faults import find_body_faults
+from kernels.calibration.confidence import advise, rate
 from kernels.calibration.joints import PairSolution, solve_joints
 from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, JointEstimate
 from kernels.types import Float
@@ -28,7 +30,8 @@ def calibrate(cleaned: Cleaned) -> Calibration:
         _estimate(name, pair, in_parent[k], in_child[k], float(length[k]))
         for k, (name, pair) in enumerate(zip(JOINTS, pairs, strict=True))
     )
-    return Calibration(joints, cleaned.findings, np.stack([pair.residual_m for pair in pairs], axis=1))
+    findings = (*cleaned.findings, *find_body_faults(cleaned, pairs))
+    return Calibration(joints, findings, np.stack([pair.residual_m for pair in pairs], axis=1))
 
 
 def bone_lengths(in_parent_sensor_m: Float, in_child_sensor_m: Float) -> Float:
@@ -42,17 +45,20 @@ def bone_lengths(in_parent_sensor_m: Float, in_child_sensor_m: Float) -> Float:
 
 def _estimate(name: str, pair: PairSolution, in_parent: Float, in_child: Float, length_m: float) -> JointEstimate:
     used = pair.weight > 0
+    range_of_motion = np.sqrt(2 * np.maximum(pair.spread, 0))
+    least = float(range_of_motion[-1])
     return JointEstimate(
         joint=name,
         parent=SENSORS[PARENT[SENSORS.index(name)]],
         length_m=length_m,
         in_parent_sensor_m=in_parent,
         in_child_sensor_m=in_child,
-        confidence="high" if pair.rank == 3 else "axis-unobserved" if pair.rank == 2 else "none",
+        confidence=rate(rank=pair.rank, least_motion_rad=least, residual_sigma_m=pair.sigma_m),
         rank=pair.rank,
         residual_rms_m=float(np.sqrt(np.mean(pair.residual_m[used] ** 2))) if used.any() else float("nan"),
         residual_sigma_m=pair.sigma_m,
         conditioning=float(np.sqrt((2 - pair.spread[-1]) / max(pair.spread[-1], 1e-12))),
-        range_of_motion_rad=np.sqrt(2 * np.maximum(pair.spread, 0)),
+        range_of_motion_rad=range_of_motion,
         n_frames=int(used.sum()),
+        advice=advise(name, rank=pair.rank, least_motion_rad=least, residual_sigma_m=pair.sigma_m),
     )

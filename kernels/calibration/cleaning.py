@@ -58,7 +58,8 @@ def clean(recording: Recording, *, cutoff_hz: float = CUTOFF_HZ) -> Cleaned:
     position_noise, rotation_noise = noise(position, turned, is_good)
     position, gain = low_pass(position, recording.frame_rate_hz, cutoff_hz=cutoff_hz)
     turned, _ = low_pass(turned, recording.frame_rate_hz, cutoff_hz=cutoff_hz)
-    findings += _outlier_findings(recording, is_usable, is_outlier)
+    if all(finding.sensor is not None for finding in findings):  # in another unit, 1 cm is no measure of an outlier
+        findings += _outlier_findings(recording, is_usable, is_outlier)
     return Cleaned(
         replace(recording, position_xyz_m=position, rotation_wxyz=rotation.normalize(turned)),
         ~is_good,

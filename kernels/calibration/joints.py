@@ -21,7 +21,7 @@ import numpy as np
 
 from kernels import rotation
 from kernels.calibration.records import PARENT, Bools, Cleaned
-from kernels.types import Float
+from kernels.types import Float, Int
 
 UNSEEN = 1e-3
 """A direction with 1 - m_k below this, 2.6 degrees of movement, is not seen."""
@@ -139,38 +139,36 @@ def closed_form(
     residual = np.sqrt(np.sum(apart * apart, axis=-1))
     used = weight > 0
     sigma = float(np.median(residual[used])) / _NORM_3D if used.any() else float("inf")
-    return PairSolution(c_i, c_j, spread, U, V, rank, residual, sigma, weight)
+    return PairSolution(c_i, c_j, spread, U, V, int(rank), residual, sigma, weight)
 
 
 def from_moments(
     M: Float, b_i: Float, b_j: Float, *, soft_m2: float = 0.0
-) -> tuple[Float, Float, Float, Float, Float, int]:
+) -> tuple[Float, Float, Float, Float, Float, Int]:
     """Solve ``[I, -M; -M^T, I] [c_i; c_j] = [b_i; b_j]`` by the singular value decomposition of M.
 
     Parameters
     ----------
-    M : (3, 3) float
-    b_i, b_j : (3,) float, metres
+    M : (..., 3, 3) float
+    b_i, b_j : (..., 3) float, metres
     soft_m2 : float, square metres
 
     Returns
     -------
-    c_i, c_j : (3,) float64, metres
-    spread : (3,) float64, falling
-    U, V : (3, 3) float64
+    c_i, c_j : (..., 3) float64, metres
+    spread : (..., 3) float64, falling
+    U, V : (..., 3, 3) float64
         In the order of ``spread``.
-    rank : int, 0 to 3
+    rank : (...) int64, 0 to 3
     """
     U, m, Vt = np.linalg.svd(M)
-    order = np.argsort(m, kind="stable")
-    U, V, m = U[:, order], Vt.T[:, order], m[order]
-    spread = 1.0 - m
-    x, y = U.T @ b_i, V.T @ b_j
+    U, V, spread = U[..., ::-1], Vt.mT[..., ::-1], 1.0 - m[..., ::-1]
+    x, y = np.vecmat(b_i, U), np.vecmat(b_j, V)
     is_seen = spread > UNSEEN
     s = np.where(is_seen, (x + y) / np.where(is_seen, spread, 1.0), 0.0)
     s = s / (1.0 + 2.0 * _SHRINK**2 * soft_m2 / (np.maximum(spread, UNSEEN) * _LEVER_M**2))
-    apart = (x - y) / (1.0 + m)
-    return U @ (s + apart) / 2.0, V @ (s - apart) / 2.0, spread, U, V, int(is_seen.sum())
+    apart = (x - y) / (2.0 - spread)
+    return np.matvec(U, s + apart) / 2.0, np.matvec(V, s - apart) / 2.0, spread, U, V, is_seen.sum(axis=-1)
 
 
 def solve_joints(cleaned: Cleaned) -> list[PairSolution]:

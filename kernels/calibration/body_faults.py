@@ -1,0 +1,199 @@
+"""What is wrong with a recording as a body: labels exchanged, sides mirrored, rotations written another way.
+
+Conventions
+-----------
+These rules look at cleaned arrays; those for single values are in :mod:`kernels.calibration.faults`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from kernels import rotation
+from kernels.calibration.joints import PairSolution
+from kernels.calibration.pairs import find_swap, pair_residuals, spanning_tree
+from kernels.calibration.records import JOINTS, PARENT, SENSORS, Cleaned, Finding
+from kernels.types import Float
+
+_MOST_FRAMES, _LEAST_FRAMES = 2000, 200
+_ENOUGH_FRAMES, _GOOD_FRAMES = 240, 960
+_SWAP_RATIO = 0.8  # one exchange: at most 0.61 where labels are exchanged, at least 1.6 where they are right
+_TREE_RATIO, _TREE_M = 3.0, 0.010
+_BETTER_RATIO = 0.5
+_SIDE = 0.3
+
+ORDERS: dict[str, Callable[[Float], Float]] = {
+    "inverted (world to sensor)": rotation.inv,
+    "x y z w": lambda q: q[..., [3, 0, 1, 2]],
+    "x y z w and inverted": lambda q: rotation.inv(q[..., [3, 0, 1, 2]]),
+}
+_MOVES: dict[str, str] = {
+    "thorax": "bend forwards, sideways and twist the trunk on still hips",
+    "head": "repeat head rolls: nod, tilt and turn",
+    "shoulder": "shrug and roll the shoulders, forwards and back",
+    "upper_arm": "circle the arms, large, forwards and back",
+    "forearm": "bend the elbow and turn the palm up and down with it bent",
+    "hand": "circle the hands at the wrist",
+    "thigh": "swing and circle the leg from the hip",
+    "shank": "bend the knee, and sitting turn the foot in and out with the thigh still",
+    "foot": "circle the foot at the ankle",
+}
+
+
+def move_to_repeat(joint: str) -> str:
+    """Say which movement shows a joint, in a performer's words."""
+    return _MOVES[joint[2:] if joint[:2] in ("l_", "r_") else joint]
+
+
+def find_body_faults(cleaned: Cleaned, pairs: list[PairSolution]) -> tuple[Finding, ...]:
+    """Judge a recording by how its sensors move together.
+
+    Parameters
+    ----------
+    cleaned : Cleaned of the 17 sensors in their order
+    pairs : the 16 joints as first solved
+
+    Returns
+    -------
+    tuple of Finding
+        Rotations written another way come alone: nothing else can be judged then. So do exchanged labels.
+    """
+    chosen = _frames(cleaned)
+    if len(chosen) < 2:
+        return ()
+    turned = np.moveaxis(cleaned.recording.rotation_wxyz[chosen], 1, 0)
+    place = np.ascontiguousarray(np.moveaxis(cleaned.recording.position_xyz_m[chosen], 1, 0))
+    residual = pair_residuals(rotation.to_matrix(turned), place)
+    order = _rotation_order(turned, place, residual)
+    if order:
+        return order
+    return (
+        *(_labels(residual) or (*_sides(cleaned, pairs, chosen), *_tree(residual))),
+        *_movement(pairs),
+    )
+
+
+def _frames(cleaned: Cleaned) -> Float:
+    """Frames to judge by: with every sensor good, where there are enough of them; spread over the recording."""
+    whole = np.flatnonzero(~cleaned.is_filled.any(axis=1))
+    if len(whole) < _LEAST_FRAMES:
+        whole = np.arange(cleaned.recording.n_frames)
+    return whole[:: max(len(whole) // _MOST_FRAMES, 1)]
+
+
+def _median_edge(residual: Float) -> float:
+    return float(np.median([residual[k, PARENT[k]] for k in range(1, len(PARENT))]))
+
+
+def _rotation_order(turned: Float, place: Float, residual: Float) -> tuple[Finding, ...]:
+    usual = _median_edge(residual)
+    step = max(turned.shape[1] // 500, 1)
+    for name, change in ORDERS.items():
+        other = _median_edge(pair_residuals(rotation.to_matrix(change(turned[:, ::step])), place[:, ::step]))
+        if other < _BETTER_RATIO * usual:
+            sentence = (
+                "recording: want quaternions w x y z from sensor to world, got what fits only as "
+                f"{name}: joints are {1000 * usual:.0f} mm apart as given, {1000 * other:.0f} mm that way; "
+                "reorder or invert qw qx qy qz"
+            )
+            return (Finding("error", None, None, sentence),)
+    return ()
+
+
+def _labels(residual: Float) -> tuple[Finding, ...]:
+    a, b, ratio = find_swap(residual, PARENT)
+    if ratio >= _SWAP_RATIO:
+        return ()
+    one, other = SENSORS[a], SENSORS[b]
+    sentence = (
+        f"{one}, {other}: want each sensor on its own segment, got two that fit exchanged (joints {1 / ratio:.1f} "
+        f"times closer); exchange the labels {one} and {other}"
+    )
+    return (Finding("error", one, None, sentence),)
+
+
+def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: Float) -> tuple[Finding, ...]:
+    """Whole limbs on the wrong side fit as well as before; only the body's shape tells."""
+    q = cleaned.recording.rotation_wxyz[chosen]
+    p = cleaned.recording.position_xyz_m[chosen]
+
+    def joint(name: str) -> Float:
+        k = JOINTS.index(name)
+        above = PARENT[k + 1]
+        return p[:, above] + rotation.apply(q[:, above], pairs[k].in_parent_m)
+
+    hips = joint("l_thigh") - joint("r_thigh")
+    shoulders = joint("l_upper_arm") - joint("r_upper_arm")
+    level = float(np.mean(np.sum(_unit(hips) * _unit(shoulders), axis=-1)))
+    bent, most = 0.0, 0.0
+    for side in ("l_", "r_"):
+        knee = joint(side + "shank")
+        across = np.cross(knee - joint(side + "thigh"), joint(side + "foot") - knee)
+        bent += float(np.sum(across * _unit(hips)))
+        most += float(np.sum(np.sqrt(np.sum(across * across, axis=-1))))
+    knees = bent / max(most, 1e-12)
+    legs, arms = "thigh, shank and foot", "shoulder, upper_arm, forearm and hand"
+    if knees < -_SIDE and level > _SIDE:
+        what, sensor, got = f"{arms}, {legs}", "l_shoulder", "both knees bending forwards, arms and legs alike"
+    elif knees < -_SIDE:
+        what, sensor, got = legs, "l_thigh", "both knees bending forwards and hips against the shoulders"
+    elif level < -_SIDE:
+        what, sensor, got = arms, "l_shoulder", "shoulders against the hips"
+    else:
+        return ()
+    sentence = f"{sensor}: want left sensors on the left, got {got}; exchange l_ and r_ of {what}"
+    return (Finding("error", sensor, None, sentence),)
+
+
+def _tree(residual: Float) -> tuple[Finding, ...]:
+    edges = set(spanning_tree(residual))
+    found = []
+    for k in range(1, len(PARENT)):
+        if (PARENT[k], k) in edges:
+            continue
+        near = [j for i, j in edges if i == k] + [i for i, j in edges if j == k]
+        best = min(near, key=lambda j: residual[k, j])
+        given = residual[k, PARENT[k]]
+        if given > max(_TREE_RATIO * residual[k, best], _TREE_M):
+            sentence = (
+                f"{SENSORS[k]}: want it to hang from {SENSORS[PARENT[k]]}, got a motion that fits {SENSORS[best]} "
+                f"better ({1000 * residual[k, best]:.0f} against {1000 * given:.0f} mm); check labels and straps"
+            )
+            found.append(Finding("warning", SENSORS[k], None, sentence))
+    return tuple(found)
+
+
+def _movement(pairs: list[PairSolution]) -> list[Finding]:
+    found = []
+    for name, pair in zip(JOINTS, pairs, strict=True):
+        n = int((pair.weight > 0).sum())
+        degrees = np.degrees(np.sqrt(2 * np.maximum(pair.spread, 0.0)))
+        if n < _ENOUGH_FRAMES:
+            sentence = f"{name}: want at least {_ENOUGH_FRAMES} frames with its two sensors good, got {n}; record longer"
+            found.append(Finding("error", name, None, sentence))
+        elif pair.rank < 2:
+            sentence = (
+                f"{name}: want it moved about at least two axes, got {degrees[1]:.1f} degrees about the second: joint "
+                f"{name} did not move enough; {move_to_repeat(name)}, then record again"
+            )
+            found.append(Finding("error", name, None, sentence))
+        elif pair.rank == 2:
+            sentence = (
+                f"{name}: want it moved about every axis, got {degrees[2]:.1f} degrees about the weakest: its place "
+                f"along the hinge is not seen and was set midway between the sensors; {move_to_repeat(name)}"
+            )
+            found.append(Finding("warning", name, None, sentence))
+        elif n < _GOOD_FRAMES:
+            sentence = (
+                f"{name}: want {_GOOD_FRAMES} frames or more with its two sensors good, got {n}: lengths will be "
+                "rough; record longer"
+            )
+            found.append(Finding("warning", name, None, sentence))
+    return found
+
+
+def _unit(vector: Float) -> Float:
+    unit: Float = vector / np.maximum(np.sqrt(np.sum(vector * vector, axis=-1, keepdims=True)), 1e-12)
+    return unit

@@ -1,0 +1,57 @@
+"""How far a joint can be trusted, in one word, and what the performer can do about it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kernels.calibration.body_faults import move_to_repeat
+from kernels.calibration.records import Confidence
+
+_LOW_DEG, _MEDIUM_DEG = 4.0, 6.0
+_LOW_M, _MEDIUM_M = 0.008, 0.004
+
+
+def rate(*, rank: int, least_motion_rad: float, residual_sigma_m: float) -> Confidence:
+    """Rate a joint.
+
+    Parameters
+    ----------
+    rank : int, 0 to 3
+    least_motion_rad : float, radians
+        Range of motion about the weakest direction.
+    residual_sigma_m : float, metres
+        Robust standard deviation an axis of the distance between its two ends.
+
+    Returns
+    -------
+    "none", "axis-unobserved", "low", "medium" or "high"
+    """
+    if rank < 2:
+        return "none"
+    if rank == 2:
+        return "axis-unobserved"
+    degrees = float(np.degrees(least_motion_rad))
+    if degrees < _LOW_DEG or not residual_sigma_m <= _LOW_M:
+        return "low"
+    if degrees < _MEDIUM_DEG or residual_sigma_m > _MEDIUM_M:
+        return "medium"
+    return "high"
+
+
+def advise(joint: str, *, rank: int, least_motion_rad: float, residual_sigma_m: float) -> str:
+    """Say what would make a joint better known; empty where it is rated high.
+
+    Parameters
+    ----------
+    joint : str, the child segment
+    rank, least_motion_rad, residual_sigma_m : as :func:`rate`
+    """
+    degrees = float(np.degrees(least_motion_rad))
+    words = []
+    if rank < 2:
+        words.append(f"{joint} did not turn ({degrees:.1f} degrees): {move_to_repeat(joint)}")
+    elif rank == 2 or degrees < _MEDIUM_DEG:
+        words.append(f"{joint} turned about one axis only {degrees:.1f} degrees: {move_to_repeat(joint)}")
+    if residual_sigma_m > _MEDIUM_M:
+        words.append(f"its sensors slide ({1000 * residual_sigma_m:.0f} mm): strap them tighter, nearer to the bone")
+    return "; ".join(words)

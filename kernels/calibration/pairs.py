@@ -1,0 +1,107 @@
+"""Every pair of sensors at once: which could share a joint.
+
+Conventions
+-----------
+All pair problems live in one Gram matrix of ``[R_1 .. R_S | p_1 .. p_S]``, rows (frame, world axis): it holds every mean
+of R_i^T R_j, every right side and every squared distance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.calibration.joints import from_moments
+from kernels.types import Float
+
+
+def pair_residuals(rotation_matrix: Float, position_xyz_m: Float) -> Float:
+    """Root mean square distance of the best common joint of every pair of sensors.
+
+    Parameters
+    ----------
+    rotation_matrix : (S, F, 3, 3) float, sensor to world
+    position_xyz_m : (S, F, 3) float, metres
+
+    Returns
+    -------
+    (S, S) float64, metres
+        Symmetric, infinite on the diagonal; 0 where F is 0.
+    """
+    s, f = position_xyz_m.shape[:2]
+    centred = position_xyz_m - position_xyz_m.mean(axis=0)
+    Z = np.concatenate(
+        [np.moveaxis(rotation_matrix, 0, 2).reshape(3 * f, 3 * s), np.moveaxis(centred, 0, 2).reshape(3 * f, s)], axis=1
+    )
+    G = Z.T @ Z / max(f, 1)
+    M = G[: 3 * s, : 3 * s].reshape(s, 3, s, 3).transpose(0, 2, 1, 3)  # [i, j] = mean of R_i^T R_j
+    Rp = G[: 3 * s, 3 * s :].reshape(s, 3, s).transpose(0, 2, 1)  # [i, j] = mean of R_i^T p_j
+    pp = G[3 * s :, 3 * s :]
+    own = Rp[np.arange(s), np.arange(s)]
+    b_i = Rp - own[:, None]
+    b_j = own[None] - Rp.transpose(1, 0, 2)
+    b_j = -b_j
+    c_i, c_j = from_moments(M, b_i, b_j)[:2]
+    d2 = np.diag(pp)[:, None] + np.diag(pp)[None] - 2 * pp
+    square = d2 + np.sum(c_i**2 + c_j**2, axis=-1) - 2 * np.sum(c_i * np.matvec(M, c_j), axis=-1)
+    square = square - 2 * np.sum(c_i * b_i + c_j * b_j, axis=-1)
+    residual = np.sqrt(np.maximum((square + square.T) / 2, 0.0))
+    np.fill_diagonal(residual, np.inf)
+    return residual
+
+
+def spanning_tree(residual_m: Float) -> list[tuple[int, int]]:
+    """Join all sensors by the pairs of least residual (Prim), as O'Brien finds a body's tree.
+
+    Parameters
+    ----------
+    residual_m : (S, S) float, symmetric, S >= 1
+
+    Returns
+    -------
+    list of S - 1 pairs of indices, smaller first, sorted
+    """
+    s = len(residual_m)
+    is_in: NDArray[np.bool_] = np.arange(s) == 0
+    best, near = residual_m[0].copy(), np.zeros(s, np.int64)
+    edges = []
+    for _ in range(s - 1):
+        k = int(np.argmin(np.where(is_in, np.inf, best)))
+        edges.append((min(k, int(near[k])), max(k, int(near[k]))))
+        is_in[k] = True
+        closer = residual_m[k] < best
+        best, near = np.where(closer, residual_m[k], best), np.where(closer, k, near)
+    return sorted(edges)
+
+
+def find_swap(residual_m: Float, parent: tuple[int, ...]) -> tuple[int, int, float]:
+    """Find the two labels whose exchange would help a tree most.
+
+    Parameters
+    ----------
+    residual_m : (S, S) float, symmetric
+    parent : S >= 2 indices, the root's -1
+
+    Returns
+    -------
+    one, other : int, indices, smaller first
+        Whose exchange leaves the least sum of residuals over the tree; the first of equal pairs.
+    ratio : float
+        Sum over the edges that the exchange touches, after over before: well below 1 where the labels are exchanged.
+    """
+    s = len(parent)
+    child, above = np.arange(1, s), np.array(parent[1:])
+    total = residual_m[child, above].sum()
+    best, found = np.inf, (0, 1, np.inf)
+    for a in range(s):
+        for b in range(a + 1, s):
+            order = np.arange(s)
+            order[[a, b]] = b, a
+            # an edge between the two stays the same pair
+            touched = (child == a) | (child == b) | (above == a) | (above == b)
+            touched &= ~(((child == a) & (above == b)) | ((child == b) & (above == a)))
+            before = residual_m[child[touched], above[touched]].sum()
+            after = residual_m[order[child[touched]], order[above[touched]]].sum()
+            if total - before + after < best:
+                best, found = total - before + after, (a, b, after / max(before, 1e-12))
+    return found
