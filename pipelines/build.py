@@ -14,10 +14,9 @@ import dagster as dg
 from dagster_shared.error import SerializableErrorInfo
 
 from assets.partitions import SESSION, SONG, dagster_key
-from pipelines.files import why
+from pipelines.files import StudioError, why
 from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP
-from pipelines.files import StudioError
 from pipelines.resources import StudioFolder
 
 # Stages in order; the groups of one stage run together, clip by clip carried over.

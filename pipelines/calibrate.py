@@ -7,7 +7,7 @@ import io
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pyarrow as pa
@@ -18,7 +18,7 @@ from assets.formats import bvh
 from assets.formats.errors import FormatError
 from assets.formats.settings import read_settings
 from assets.sources import POSES_ENDING
-from kernels.calibration.records import JOINTS, Calibration
+from kernels.calibration.records import JOINTS, PARENT, Calibration
 from kernels.calibration.tree_solver import PoseSolver
 from pipelines.files import write_beside
 from pipelines.outcome import DONE, NOTHING_DONE, Outcome
@@ -51,9 +51,7 @@ def calibrate(
     Raises
     ------
     FormatError
-        If the file is no recording, or the settings are none.
-    OSError
-        If it cannot be opened.
+        If the file is no recording or cannot be opened, or the settings are none.
     LakeError
         If the results cannot be written.
     """
@@ -67,6 +65,8 @@ def calibrate(
         )
     except CalibrationError as error:
         return _refusal(recording, error)
+    except OSError as error:
+        raise FormatError(str(recording), 0, f"cannot be read: {error.strerror or error}; see to the file") from error
     begun_s = time.perf_counter()
     table = poses_table(found)
     write_beside(poses_path, lambda file: file.write(parquet(table)))
@@ -206,8 +206,14 @@ class PoseSolvers:
         import pyopencl as cl
 
         from kernels.opencl.device import pick_device
-        from kernels.opencl.spring_relaxation import SpringRelaxation
+
+        device = pick_device(self._settings.device)
+        context = cl.Context([device])
+        precision: Literal["single", "double"] = "double" if device.double_fp_config else "single"
+        if method == "springs":
+            from kernels.opencl.spring_relaxation import SpringRelaxation
+
+            return SpringRelaxation(context, parent=PARENT, precision=precision)
         from kernels.opencl.tree_gauss_newton import TreeGaussNewton
 
-        context = cl.Context([pick_device(self._settings.device)])
-        return SpringRelaxation(context) if method == "springs" else TreeGaussNewton(context)
+        return TreeGaussNewton(context, parent=PARENT, precision=precision)

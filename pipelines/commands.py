@@ -17,10 +17,9 @@ from assets.sources import Request, Song
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.files import write_beside
+from pipelines.files import StudioError, write_beside
 from pipelines.freshness import Freshness
 from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
-from pipelines.files import StudioError
 from pipelines.resources import StudioFolder
 from pipelines.web import existing
 from schemas.music import SONG

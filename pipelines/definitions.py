@@ -5,8 +5,8 @@ from typing import Any
 import dagster as dg
 
 from pipelines import jobs, schedules, sensors
-from pipelines.collection import ASSETS, freshness
 from pipelines.calibrate import PoseSolvers
+from pipelines.collection import ASSETS, freshness
 from pipelines.io_managers import EarlierTables, LakeIOManager, StageIOManager
 from pipelines.resources import NoProgress, StudioFolder, pair_distance, studio_from_environment
 

@@ -11,8 +11,7 @@ from assets.formats.audio import Audio
 from kernels.synthetic import rigs
 from kernels.synthetic.dancer import MOVES, Take, take
 from kernels.synthetic.music import drum_machine_song
-from pipelines.files import write_beside
-from pipelines.files import StudioError
+from pipelines.files import StudioError, write_beside
 
 SONG = "drum_machine"
 TEMPO_BPM = 116.0

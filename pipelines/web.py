@@ -12,8 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 from pipelines.build import open_instance
-from pipelines.files import why
-from pipelines.files import StudioError
+from pipelines.files import StudioError, why
 from pipelines.resources import StudioFolder
 
 

@@ -96,6 +96,6 @@ def unknown_sensor(name: str) -> str:
     near = difflib.get_close_matches(name, SENSORS, n=1, cutoff=0.5)
     hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(SENSORS)}"
     return (
-        f"sensor {name!r}: want a sensor of the suit ({hint}); rename it, or say in odori.toml, [sensors], which it is, "
-        f'or "{name}" = "" to leave it out'
+        f"sensor {name!r}: want a sensor of the suit ({hint}); rename it, or say in odori.toml, [sensors], which it "
+        f'is, or "{name}" = "" to leave it out'
     )
