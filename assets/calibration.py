@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -156,8 +156,8 @@ def _calibrate(read: Suit, settings: CalibrationSettings, solvers: Solvers | Non
     gauge = find_gauge(poses, rate_hz)
     clip = watch("clip", lambda: to_clip(poses, rate_hz, gauge=gauge))
     doubts = [f.sentence for f in findings if f.severity == "warning"]
-    whole = Suit(recording, read.first_frame_index, read.metres_per_unit, read.notes)
-    return Calibrated(whole, cleaned, calibration, poses, gauge, clip, (*read.notes, *doubts), watch.seconds)
+    whole = replace(read, recording=recording)
+    return Calibrated(whole, cleaned, calibration, poses, gauge, clip, (*read.warnings, *doubts), watch.seconds)
 
 
 def _stop_at(findings: Sequence[Finding], calibration: Calibration | None, watch: _Watch) -> None:

@@ -33,6 +33,7 @@ def from_calibration(clip_id: str, found: Calibrated) -> pa.Table:
         "noise_rotation_rad": found.cleaned.rotation_noise_rad[1:],
         "filled_ratio": found.cleaned.is_filled.mean(axis=0)[1:],
         "outlier_ratio": found.cleaned.n_outliers[1:] / max(found.cleaned.recording.n_frames, 1),
+        "span_s": np.full(n, found.clip.duration_s / max(min(N_SPANS, found.clip.n_frames), 1)),
         "gap_before_m": np.sqrt(np.mean(before**2, axis=0)),
         "gap_after_m": after.max(axis=0, initial=0.0),
     }

@@ -131,8 +131,6 @@ def joint_facts(calibration: Calibration) -> list[dict[str, Any]]:
             "in_child_sensor_m": [float(x) for x in joint.in_child_sensor_m],
             "confidence": joint.confidence,
             "rank": int(joint.rank),
-            "residual_rms_m": float(joint.residual_rms_m),
-            "advice": joint.advice,
         }
         for joint in calibration.joints
     ]
@@ -167,6 +165,7 @@ def _report(recording: Path, found: Calibrated, seconds: dict[str, float], poses
         f"{own.frame_rate_hz:g} Hz; {100 * n_missing / n:.1f} % missing, {100 * n_outliers / n:.1f} % outliers; noise "
         f"{1000 * float(np.median(cleaned.position_noise_m)):.1f} mm, "
         f"{np.degrees(float(np.median(cleaned.rotation_noise_rad))):.2f} deg",
+        *(f"  {note}" for note in found.suit.notes),
         *_joint_lines(found.calibration),
         f"gaps at the joints: {before:.1f} mm before, at most {after:.2g} mm after",
         f"poses: {poses}" + (f"; BVH: {bvh_out}" if bvh_out else ""),

@@ -283,6 +283,8 @@ def _status_report(
     lines += [f"    {a['state']}: {a['asset']}[{a['partition']}]: {a['why']}" for a in unfresh[:LONGEST_LIST]]
     lines += _more(unfresh)
     lines += [f"  {line}" for line in _refusals(refused)]
+    doubtful = [f"    warning: {clip['path']}: {warning}" for clip in clips for warning in clip["warnings"]]
+    lines += doubtful[:LONGEST_LIST] + _more(doubtful)
     lines += [f"  note: {note}" for note in notes]
     return "\n".join(lines)
 
@@ -291,6 +293,8 @@ def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
     """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
     stored = {}
     for session in studio.lake.keys("clip"):
+        if studio.lake.stamp("clip", session) is None:  # of an older version: as if it were not there
+            continue
         for row in studio.lake.table("clip", session).to_pylist():
             stored[row["path"]] = row
     found = []
@@ -298,7 +302,8 @@ def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
         path = clip.path.encode("utf-8", "backslashreplace").decode()
         row = stored.get(path)
         seen = _seen(row, clip.sha256, clip.problem)
-        found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
+        warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
+        found.append({"path": path, "key": clip.key, "session": clip.session, **seen, "warnings": warnings})
     return found
 
 

@@ -49,6 +49,7 @@ CALIBRATION = Table(
         ),
         Column("gap_after_m", pa.float32(), "Gap at the joint in the stored poses, largest of all frames."),
         Column("gap_before_curve_m", CURVE, "Root mean square of the gap before, in equal spans of the clip."),
+        Column("span_s", pa.float32(), "Length of one of those spans."),
         Column("gap_after_curve_m", CURVE, "Root mean square of the gap after, in the same spans."),
         Column("rest_start_frame_index", pa.int32(), "First frame of the rest pose that says what a bone's frame is."),
         Column("rest_end_frame_index", pa.int32(), "One past its last frame."),

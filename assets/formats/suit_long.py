@@ -37,13 +37,15 @@ class Suit:
         Number of its first frame in the file.
     metres_per_unit : float
         What the file's lengths were multiplied by.
-    notes : what was assumed or mended in reading, one sentence each
+    notes : what was made of the file, one sentence each
+    warnings : what was assumed of it, or is missing from it
     """
 
     recording: Recording
     first_frame_index: int
     metres_per_unit: float
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def is_long(names: list[str]) -> bool:
@@ -89,19 +91,19 @@ def parse(columns: Columns, own: dict[str, str] | None = None) -> Suit:
     valid_name = column(columns, *_VALID)
     here = columns.flags(valid_name) if valid_name else np.ones(columns.n_rows, bool)
     valid[frame, number] = here
-    notes = [said] if said else []
+    warnings = [said] if said else []
     if not valid_name:  # a drop-out is then written as no numbers at all
         valid &= ~(np.isnan(position).all(-1) & np.isnan(turned).all(-1))
     n_missing = f * s - columns.n_rows
     if n_missing:
-        notes.append(f"{n_missing} of {f * s} rows are missing; their sensors count as not heard")
+        warnings.append(f"{n_missing} of {f * s} rows are missing; their sensors count as not heard")
     try:
         line = timeline.timeline(at_s)
     except ValueError as error:
         raise columns.error(None, str(error)) from error
-    notes += notes_on_time(line, f)
+    notes, more = notes_on_time(line, f)
     position, turned, valid = timeline.onto_grid(line, at_s, position, turned, valid)
-    return Suit(kept(line.rate_hz, sensors, position, turned, valid), first_frame, scale, tuple(notes))
+    return Suit(kept(line.rate_hz, sensors, position, turned, valid), first_frame, scale, notes, (*warnings, *more))
 
 
 def kept(
@@ -190,13 +192,13 @@ def _once(columns: Columns, frame: Int, number: Int, sensors: tuple[str, ...]) -
         )
 
 
-def notes_on_time(line: timeline.Timeline, n_frames: int) -> list[str]:
-    """Say what was made of the times of a recording."""
+def notes_on_time(line: timeline.Timeline, n_frames: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Say what was made of the times of a recording, and what is doubtful about them."""
     if line.kind == "uneven":
-        return [f"times are uneven; interpolated to {line.rate_hz:g} frames a second"]
-    said = [] if line.kind == "even" else [f"times come in bursts; samples counted at {line.rate_hz:g} a second"]
+        return (), (f"times are uneven; interpolated to {line.rate_hz:g} frames a second",)
+    said = () if line.kind == "even" else (f"times come in bursts; samples counted at {line.rate_hz:g} a second",)
     lost = line.n_places - n_frames
-    return said + ([f"{lost} frames are missing from the times; they count as not heard"] if lost else [])
+    return said, (f"{lost} frames are missing from the times; they count as not heard",) if lost else ()
 
 
 def to_table(recording: Recording) -> pa.Table:

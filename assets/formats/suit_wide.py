@@ -71,10 +71,11 @@ def parse(columns: Columns, own: dict[str, str] | None = None, *, unit: str = "a
     _rising(columns, time_name, time_s)
     turned = np.stack([np.stack([columns.numbers(turned_at[s][c][0]) for c in "wxyz"], -1) for s in stations], 1)
     placed = np.stack([np.stack([columns.numbers(placed_at[s][c][0]) for c in "xyz"], -1) for s in stations], 1)
-    notes = [said] if said else []
+    notes, warnings = [], [said] if said else []
     units = {placed_at[s][c][1] for s in stations for c in "xyz"}
-    scale, word = _metres(units, placed, sensors, unit)
-    notes += [word] if word else []
+    scale, note, warning = _metres(units, placed, sensors, unit)
+    notes += note
+    warnings += warning
     valid = np.isfinite(np.concatenate([turned, placed], -1)).all(-1)
     seen = timeline.collapse(time_s, np.concatenate([turned, placed], -1))
     if len(seen.row) < 0.95 * len(time_s):
@@ -87,9 +88,9 @@ def parse(columns: Columns, own: dict[str, str] | None = None, *, unit: str = "a
         line = timeline.timeline(at_s)
     except ValueError as error:
         raise columns.error(None, str(error)) from error
-    notes += notes_on_time(line, len(rows))
+    on_time, more = notes_on_time(line, len(rows))
     arrays = timeline.onto_grid(line, at_s, scale * placed[rows], turned[rows], valid[rows])
-    return Suit(kept(line.rate_hz, sensors, *arrays), 0, scale, tuple(notes))
+    return Suit(kept(line.rate_hz, sensors, *arrays), 0, scale, (*notes, *on_time), (*warnings, *more))
 
 
 def _stations(names: list[str], patterns: tuple[re.Pattern[str], ...]) -> dict[str, dict[str, tuple[str, str]]]:
@@ -133,22 +134,23 @@ def _rising(columns: Columns, name: str, time_s: Float) -> None:
         raise columns.error(row, f"column {name!r}: {what}")
 
 
-def _metres(units: set[str], placed: Float, sensors: tuple[str, ...], unit: str) -> tuple[float, str]:
-    """Metres a unit, and a word on it where it was guessed."""
+def _metres(units: set[str], placed: Float, sensors: tuple[str, ...], unit: str) -> tuple[float, list[str], list[str]]:
+    """Metres a unit, a note where it was told by size, and a warning where it was assumed."""
     said = units - {""}
     if len(said) == 1 and "" not in units:
-        return METRES_PER_UNIT[said.pop()], ""
+        return METRES_PER_UNIT[said.pop()], [], []
     if unit != "auto":
-        return METRES_PER_UNIT[unit], ""
+        return METRES_PER_UNIT[unit], [], []
     if set(sensors) >= set(SENSORS):
         span = _span(placed)
         for name, least, most in _BODY:
             if least <= span < most:
-                return METRES_PER_UNIT[name], f"lengths are taken as {name}: the body is {span:.3g} of them across"
-    return METRES_PER_UNIT["in"], (
+                return METRES_PER_UNIT[name], [f"lengths are in {name}: the body is {span:.3g} of them across"], []
+    warning = (
         'lengths are taken as inches, as such trackers are delivered; if they are not, say unit = "cm" in odori.toml, '
         "[calibration]"
     )
+    return METRES_PER_UNIT["in"], [], [warning]
 
 
 def _span(placed: Float) -> float:
