@@ -15,7 +15,7 @@ ball joints", J. Biomechanics 2006 (SCoRE: the same equations).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,8 @@ class PairSolution:
     sigma_m : float, metres
         Robust standard deviation an axis of the residual.
     weight : (F,) float64, 0 to 1
+    soft_m : float, metres
+        Standard deviation an axis of what noise does not explain: soft tissue under the sensors.
     """
 
     in_parent_m: Float
@@ -59,6 +61,7 @@ class PairSolution:
     residual_m: Float
     sigma_m: float
     weight: Float
+    soft_m: float = 0.0
 
 
 def solve_pair(
@@ -101,7 +104,7 @@ def solve_pair(
     soft = _soft_tissue_m2(solution, rotation_noise_rad, position_noise_m)
     if soft > 0 and weight.any():
         solution = closed_form(parent, child, weight, rotation_noise_rad=rotation_noise_rad, soft_m2=soft)
-    return solution
+    return replace(solution, soft_m=float(np.sqrt(soft)))
 
 
 def closed_form(

@@ -8,6 +8,7 @@ import numpy as np
 
 from kernels import rotation
 from kernels.calibration.records import PARENT, SENSORS, Calibration, Cleaned, Poses
+from kernels.calibration.springs import relax_springs
 from kernels.calibration.tree_solver import FILLED_WEIGHT, BodyModel, PoseSolver, Stream, make_model, solve_tree
 from kernels.types import Float
 
@@ -38,13 +39,19 @@ def solve_poses(
     -------
     Poses
         Empty where F is 0.
+
+    Raises
+    ------
+    ValueError
+        If the method is not known, or from :func:`kernels.calibration.tree_solver.check_stream`.
     """
+    if method not in ("gauss_newton", "springs"):
+        raise ValueError(f"method: want gauss_newton or springs, got {method!r}")
     model = body_model(calibration)
-    if method != "gauss_newton":
-        raise ValueError(f"method: want gauss_newton, got {method!r}")
-    solver = solve_tree if device is None else device
+    reference, usual = (solve_tree, 2) if method == "gauss_newton" else (relax_springs, 30)
+    solver = reference if device is None else device
     stream = to_stream(cleaned)
-    solved = solver(model, stream, iterations=iterations or 2)
+    solved = solver(model, stream, iterations=usual if iterations is None else iterations)
     position = solved.position_xyz_m
     before = gaps(
         model, stream.position_xyz_m - rotation.apply(stream.rotation_wxyz, model.sensor_m), stream.rotation_wxyz

@@ -1,0 +1,130 @@
+"""The document's springs on an OpenCL device: the twin of :func:`kernels.calibration.springs.relax_springs`."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import Literal
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from kernels.calibration.springs import JOINT_STIFFNESS, KEPT_SPEED, spring_body
+from kernels.calibration.tree_solver import BodyModel, Solved, Stream, check_stream
+
+_GROUP = 16
+
+
+class SpringRelaxation:
+    """A :class:`kernels.calibration.tree_solver.PoseSolver` on one device: the springs, one work-item a frame.
+
+    Parameters
+    ----------
+    context : cl.Context of one device
+        From :func:`kernels.opencl.device.pick_device`; nothing is chosen here.
+    parent : indices of the bones' parents, the root's -1
+    precision : "single" or "double"
+    is_serial : bool
+        One work-item goes through all frames: the same bits, for comparison.
+
+    Raises
+    ------
+    ValueError
+        If the context has not exactly one device, or it cannot compute in the precision.
+    """
+
+    def __init__(
+        self,
+        context: cl.Context,
+        *,
+        parent: tuple[int, ...],
+        precision: Literal["single", "double"] = "double",
+        is_serial: bool = False,
+    ) -> None:
+        if len(context.devices) != 1:
+            raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
+        self.context = context
+        self.parent = parent
+        self.is_serial = is_serial
+        self._device = context.devices[0]
+        if precision == "double" and not self._device.double_fp_config:
+            raise ValueError(f"precision: want single on {self._device.name.strip()}, got double; it has none")
+        self._dtype = np.dtype(np.float64 if precision == "double" else np.float32)
+        source = resources.files("kernels.opencl").joinpath("spring_relaxation.cl").read_text(encoding="utf-8")
+        options = {
+            "REAL": "double" if precision == "double" else "float",
+            "S": len(parent),
+            "PARENTS": ",".join(str(k) for k in parent),
+            "JOINT": JOINT_STIFFNESS,
+            "KEPT": KEPT_SPEED,
+        }
+        defined = [part for name, value in options.items() for part in ("-D", f"{name}={value}")]
+        self._program = cl.Program(context, source).build(options=defined)
+        self._queue = cl.CommandQueue(context)
+
+    @property
+    def name(self) -> str:
+        """Device and driver, for metadata."""
+        return (
+            f"{self._device.name.strip()} ({self._device.platform.name.strip()} {self._device.driver_version.strip()})"
+        )
+
+    def __call__(self, model: BodyModel, stream: Stream, *, iterations: int = 30) -> Solved:
+        """Let the springs pull.
+
+        Parameters
+        ----------
+        model : BodyModel
+            On the tree this was made for.
+        stream : Stream of F frames
+        iterations : int, >= 1
+
+        Returns
+        -------
+        Solved
+            As the reference. Empty where F is 0.
+
+        Raises
+        ------
+        ValueError
+            As the reference, or if the model is of another tree.
+        """
+        check_stream(model, stream, iterations)
+        if model.parent != self.parent:
+            raise ValueError(f"model: want the tree {self.parent}, got {model.parent}; make another solver")
+        f, n = stream.weight.shape
+        if f == 0:
+            return Solved(np.zeros((0, n, 3)), np.zeros((0, n, 4)))
+        origin = stream.position_xyz_m[:, :1] if self._dtype == np.float32 else np.zeros((1, 1, 3))
+        springs = spring_body(model)
+        body = np.concatenate(
+            [
+                springs.proximal_m,
+                springs.sensor_m,
+                springs.attachment_m,
+                springs.turnability[:, None],
+                springs.hold[:, None],
+            ],
+            axis=1,
+        )
+        flags = cl.mem_flags
+        given = [
+            cl.Buffer(self.context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=np.ascontiguousarray(a, self._dtype))
+            for a in ((stream.position_xyz_m - origin).reshape(f, -1).T, stream.rotation_wxyz.reshape(f, -1).T, body)
+        ]
+        size = self._dtype.itemsize
+        place = cl.Buffer(self.context, flags.WRITE_ONLY, size=size * 3 * n * f)
+        answer = cl.Buffer(self.context, flags.WRITE_ONLY, size=size * 4 * n * f)
+        # its own: threads may share us
+        kernel = cl.Kernel(self._program, "spring_relaxation_serial" if self.is_serial else "spring_relaxation")
+        kernel.set_args(np.int32(iterations), np.int32(f), *given, place, answer)
+        items, group = ((1,), (1,)) if self.is_serial else ((-(-f // _GROUP) * _GROUP,), (_GROUP,))
+        cl.enqueue_nd_range_kernel(self._queue, kernel, items, group)
+        position = self._read(place, (3 * n, f)).reshape(f, n, 3) + origin
+        return Solved(position, self._read(answer, (4 * n, f)).reshape(f, n, 4))
+
+    def _read(self, buffer: cl.Buffer, shape: tuple[int, int]) -> NDArray[np.float64]:
+        """Bring an answer back as (F, rows) float64."""
+        rows = np.zeros(shape, self._dtype)
+        cl.enqueue_copy(self._queue, rows, buffer)
+        return np.ascontiguousarray(rows.T, np.float64)
