@@ -151,7 +151,7 @@ def calibration(joints: pa.Table) -> bytes:
     names = joints["joint_name"].to_pylist()
     before, after = (to_curves(joints[f"gap_{when}_curve_m"]) for when in ("before", "after"))
     figure = _figure(12, 6.5)
-    left, right = figure.subfigures(1, 2, width_ratios=(1.7, 1))
+    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1.7, 1)))
     heat, gap = left.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     most_mm = max(float(np.percentile(1000 * before, 99)) if before.size else 0.0, 1.0)
     span_s = joints["span_s"][0].as_py()
@@ -167,7 +167,7 @@ def calibration(joints: pa.Table) -> bytes:
     gap.set_title("gap at the joints, mm, root mean square of all", fontsize=8, loc="left")
     gap.set_xlabel("seconds of the recording", fontsize=8)
     gap.legend(fontsize=7, frameon=False, loc="center right")
-    bones = right.subplots()
+    bones = right.add_subplot()
     words = joints["confidence_label"].to_pylist()
     length_mm = 1000 * tables.to_numbers(joints["length_m"])
     bones.barh(range(len(names)), length_mm, color=[_CONFIDENCE[word] for word in words])
@@ -180,7 +180,9 @@ def calibration(joints: pa.Table) -> bytes:
         handles=[Patch(color=_CONFIDENCE[word], label=word) for word in _CONFIDENCE if word in words],
         fontsize=7,
         frameon=False,
-        loc="lower right",
+        ncols=len(_CONFIDENCE),
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.04),
     )
     for axes in (heat, gap, bones):
         _plain(axes)

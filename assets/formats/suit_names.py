@@ -36,8 +36,11 @@ def sensor_of(name: str) -> str | None:
     words = [w for w in words if w not in _NOISE]
     side = next((_SIDES[w] for w in words if w in _SIDES), "")
     part = _PART.get("".join(w for w in words if w not in _SIDES))
-    if part is None and len(words) == 1 and words[0][:1] in "lr":  # lthigh, rforearm
-        side, part = words[0][0], _PART.get(words[0][1:])
+    if part is None and len(words) == 1:  # lefthand, lthigh, rforearm
+        for start in ("left", "right", "l", "r"):
+            if words[0].startswith(start) and words[0][len(start) :] in _PART:
+                side, part = _SIDES[start], _PART[words[0][len(start) :]]
+                break
     if part is None or (part in _SIDED) != bool(side):
         return None
     return f"{side}_{part}" if side else part

@@ -78,14 +78,14 @@ def parse(columns: Columns, own: dict[str, str] | None = None, *, unit: str = "a
     warnings += warning
     valid = np.isfinite(np.concatenate([turned, placed], -1)).all(-1)
     seen = timeline.collapse(time_s, np.concatenate([turned, placed], -1))
-    if len(seen.row) < 0.95 * len(time_s):
-        notes.append(f"{len(time_s) - len(seen.row)} of {len(time_s)} rows repeat what was said and are left out")
-        valid[seen.row] &= seen.is_new
-        rows, at_s = seen.row, time_s[seen.arrived_row]
-    else:
-        rows, at_s = np.arange(len(time_s)), time_s
+    rows, at_s = np.arange(len(time_s)), time_s
     try:
-        line = timeline.timeline(at_s)
+        line = timeline.timeline(time_s)
+        if len(seen.row) < len(time_s) and (line.kind != "even" or np.median(np.diff(seen.row, prepend=-1)) >= 2):
+            notes.append(f"{len(time_s) - len(seen.row)} of {len(time_s)} rows repeat what was said and are left out")
+            valid[seen.row] &= seen.is_new
+            rows, at_s = seen.row, time_s[seen.arrived_row]
+            line = timeline.timeline(at_s)
     except ValueError as error:
         raise columns.error(None, str(error)) from error
     on_time, more = notes_on_time(line, len(rows))
