@@ -171,7 +171,9 @@ def _movement(pairs: list[PairSolution]) -> list[Finding]:
         n = int((pair.weight > 0).sum())
         degrees = np.degrees(np.sqrt(2 * np.maximum(pair.spread, 0.0)))
         if n < _ENOUGH_FRAMES:
-            sentence = f"{name}: want at least {_ENOUGH_FRAMES} frames with its two sensors good, got {n}; record longer"
+            sentence = (
+                f"{name}: want at least {_ENOUGH_FRAMES} frames with its two sensors good, got {n}; record longer"
+            )
             found.append(Finding("error", name, None, sentence))
         elif pair.rank < 2:
             sentence = (

@@ -5,26 +5,43 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.calibration.body_faults import find_body_faults
+from kernels.calibration.bundle import adjust
 from kernels.calibration.confidence import advise, rate
 from kernels.calibration.joints import PairSolution, solve_joints
 from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, JointEstimate
 from kernels.types import Float
 
 
-def calibrate(cleaned: Cleaned) -> Calibration:
+def calibrate(cleaned: Cleaned, *, has_adjustment: bool = True) -> Calibration:
     """Find the joints of a body from its sensors.
 
     Parameters
     ----------
     cleaned : Cleaned of the 17 sensors in their order
+    has_adjustment : bool
+        Whether whole poses are fitted after the joints were solved one by one (:mod:`kernels.calibration.bundle`).
 
     Returns
     -------
     Calibration
+        Where a finding is an error, the joints are what could be computed all the same, for looking at only.
+
+    Raises
+    ------
+    ValueError
+        If the sensors are not the 17 in their order.
     """
+    if cleaned.recording.sensors != SENSORS:
+        raise ValueError(
+            f"sensors: want {', '.join(SENSORS)} in this order, got {', '.join(cleaned.recording.sensors)}; "
+            "see the findings of check_recording"
+        )
     pairs = solve_joints(cleaned)
-    in_parent = np.stack([pair.in_parent_m for pair in pairs])
-    in_child = np.stack([pair.in_child_m for pair in pairs])
+    if has_adjustment:
+        in_parent, in_child = adjust(cleaned, pairs)
+    else:
+        in_parent = np.stack([pair.in_parent_m for pair in pairs])
+        in_child = np.stack([pair.in_child_m for pair in pairs])
     length = bone_lengths(in_parent, in_child)
     joints = tuple(
         _estimate(name, pair, in_parent[k], in_child[k], float(length[k]))

@@ -134,7 +134,11 @@ def _units(recording: Recording, is_usable: Bools) -> list[Finding]:
     if 0.5 <= reach <= 3.0:
         return []
     unit = next((f"{name}: multiply by {factor}" for low, high, name, factor in _UNITS if low <= reach <= high), None)
-    cure = f"positions look like {unit}" if unit else "check the unit of px_m py_m pz_m, and that one body wears all sensors"
+    cure = (
+        f"positions look like {unit}"
+        if unit
+        else "check the unit of px_m py_m pz_m, and that one body wears all sensors"
+    )
     sentence = f"recording: want metres, sensors 0.5 to 3 m apart, got {reach:.4g} between the farthest two; {cure}"
     return [Finding("error", None, None, sentence)]
 

@@ -216,7 +216,7 @@ def range_of_motion(
     local = np.zeros((n_frames, 17, 4))
     for k, name in enumerate(SENSORS):
         if k == 0:
-            angle = _sways(rng, time_s, np.array([5.0, 7.0, 40.0]), pace_hz=0.15)
+            angle = sways(rng, time_s, np.array([5.0, 7.0, 40.0]), pace_hz=0.15)
         else:
             degrees = np.array(_RANGE_DEG[part(name)])
             mean = np.array([0.0, 0.0, 0.0])
@@ -226,14 +226,14 @@ def range_of_motion(
                 mean[2] = 45.0 if name.startswith("r_") else -45.0
             if part(name) == "upper_arm":
                 mean[0] = 35.0 if name.startswith("r_") else -35.0
-            angle = _sways(rng, time_s, degrees, pace_hz=0.45) + size * np.radians(mean)
+            angle = sways(rng, time_s, degrees, pace_hz=0.45) + size * np.radians(mean)
             if part(name) == "shank":
                 angle[:, 1] = np.maximum(angle[:, 1], np.log1p(np.exp(8 * angle[:, 1])) / 8)
             if name in hinged:
                 angle *= np.array([0.0, 1.0, 0.0]) if part(name) != "forearm" else np.array([0.0, 0.0, 1.0])
             angle = angle * (0.0 if name in frozen else size)
         local[:, k] = rotation.exp(ease * angle)
-    root = _sways(rng, time_s, np.degrees([0.5, 0.5, 0.03]), pace_hz=0.12)
+    root = sways(rng, time_s, np.degrees([0.5, 0.5, 0.03]), pace_hz=0.12)
     return Motion(frame_rate_hz, ease * root + np.array([0.9, 0.1, 0.95]), local)
 
 
@@ -299,6 +299,31 @@ def made_up(
     return record(make_body(seed), motion, seed=seed, disturbance=disturbance)
 
 
+def sways(rng: np.random.Generator, time_s: Float, degrees: Float, *, pace_hz: float) -> Float:
+    """Sway about three axes, three sines each, of no common period.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    time_s : (F,) float, seconds
+    degrees : (3,) float
+        Standard deviation of each angle.
+    pace_hz : float, Hz
+        Around which the sines lie.
+
+    Returns
+    -------
+    (F, 3) float64, radians
+    """
+    hz = pace_hz * rng.uniform(0.35, 1.9, (3, 3))
+    phase = rng.uniform(0, 2 * np.pi, (3, 3))
+    weight = rng.uniform(0.6, 1.2, (3, 3))
+    weight *= np.sqrt(2 / np.sum(weight**2, axis=0))
+    angle = np.sum(weight * np.sin(2 * np.pi * hz * time_s[:, None, None] + phase), axis=1)
+    swung: Float = np.radians(degrees) * angle
+    return swung
+
+
 def swap(recording: Recording, pairs: dict[str, str]) -> Recording:
     """Exchange sensors: each key gets what the value's sensor said, and the other way round."""
     order = list(range(len(recording.sensors)))
@@ -315,17 +340,6 @@ def swap(recording: Recording, pairs: dict[str, str]) -> Recording:
 
 def _stream(seed: int, purpose: str) -> np.random.Generator:
     return np.random.default_rng([seed, *purpose.encode()])
-
-
-def _sways(rng: np.random.Generator, time_s: Float, degrees: Float, *, pace_hz: float) -> Float:
-    """Angles (F, 3) radians of given standard deviation: three sines each, of no common period."""
-    hz = pace_hz * rng.uniform(0.35, 1.9, (3, 3))
-    phase = rng.uniform(0, 2 * np.pi, (3, 3))
-    weight = rng.uniform(0.6, 1.2, (3, 3))
-    weight *= np.sqrt(2 / np.sum(weight**2, axis=0))
-    angle = np.sum(weight * np.sin(2 * np.pi * hz * time_s[:, None, None] + phase), axis=1)
-    swung: Float = np.radians(degrees) * angle
-    return swung
 
 
 def _bursts(rng: np.random.Generator, shape: tuple[int, int], ratio: float, *, mean_length: int) -> NDArray[np.bool_]:
