@@ -189,7 +189,7 @@ def collapse(time_s: Float, values: Float) -> Collapsed:
     is_new = np.concatenate([np.ones((1, values.shape[1]), bool), ~same.all(axis=-1)])
     count = is_new.sum(axis=0)
     wait_s = np.diff(time_s, prepend=time_s[0])
-    often = np.flatnonzero(count >= 0.95 * count.max())
+    often = np.flatnonzero(count >= 0.95 * count.max() - 1)
     opener = often[np.argmax([np.median(wait_s[is_new[:, s]]) for s in often])]
     first = np.flatnonzero(is_new[:, opener])
     heard = np.add.reduceat(is_new, first, axis=0) > 0
