@@ -43,7 +43,7 @@ def test_empty_studio_has_nothing(tmp_path):
 
 def test_documents_are_no_sources_and_strangers_are_refused(studio):
     found = look(studio({"clips/LICENSE.txt": b"", "clips/x.fbx": b"x", "songs/x.zip": b"x", "songs/readme.md": b""}))
-    assert [c.problem[:31] for c in found.clips] == ["want a BVH file (.bvh) or a suit"]
+    assert [c.problem[:32] for c in found.clips] == ["want a BVH file (.bvh) or a suit"]
     assert [s.problem[:10] for s in found.songs] == ["want audio"]
 
 
