@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import rotation
 from kernels.calibration.joints import PairSolution
@@ -75,7 +76,7 @@ def find_body_faults(cleaned: Cleaned, pairs: list[PairSolution]) -> tuple[Findi
     )
 
 
-def _frames(cleaned: Cleaned) -> Float:
+def _frames(cleaned: Cleaned) -> NDArray[np.intp]:
     """Frames to judge by: with every sensor good, where there are enough of them; spread over the recording."""
     whole = np.flatnonzero(~cleaned.is_filled.any(axis=1))
     if len(whole) < _LEAST_FRAMES:
@@ -114,7 +115,7 @@ def _labels(residual: Float) -> tuple[Finding, ...]:
     return (Finding("error", one, None, sentence),)
 
 
-def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: Float) -> tuple[Finding, ...]:
+def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]) -> tuple[Finding, ...]:
     """Whole limbs on the wrong side fit as well as before; only the body's shape tells."""
     q = cleaned.recording.rotation_wxyz[chosen]
     p = cleaned.recording.position_xyz_m[chosen]
@@ -122,7 +123,8 @@ def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: Float) -> tuple[
     def joint(name: str) -> Float:
         k = JOINTS.index(name)
         above = PARENT[k + 1]
-        return p[:, above] + rotation.apply(q[:, above], pairs[k].in_parent_m)
+        at: Float = p[:, above] + rotation.apply(q[:, above], pairs[k].in_parent_m)
+        return at
 
     hips = joint("l_thigh") - joint("r_thigh")
     shoulders = joint("l_upper_arm") - joint("r_upper_arm")

@@ -9,18 +9,25 @@ together the 96 coordinates of the anchors, each joint in its two sensors' frame
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import linalg
 
 from kernels import rotation
 from kernels.calibration.joints import UNSEEN, PairSolution
 from kernels.calibration.records import PARENT, Cleaned
-from kernels.calibration.tree_solver import FILLED_WEIGHT, KINDNESS, Stream, make_model, solve_tree
+from kernels.calibration.tree_solver import (
+    FILLED_WEIGHT,
+    KINDNESS,
+    POSITION_SIGMA_M,
+    ROTATION_SIGMA_RAD,
+    BodyModel,
+    Stream,
+    make_model,
+    solve_tree,
+)
 from kernels.types import Float
-
-POSITION_SIGMA_M = 0.005
-ROTATION_SIGMA_RAD = float(np.radians(1.5))
-"""Flat on purpose: estimated ones run away, because the poses soak up the residuals they are estimated from."""
 
 _N_FRAMES = 700
 _STEPS = 3
@@ -85,12 +92,12 @@ def _split(anchors: Float) -> tuple[Float, Float]:
     return pair[:, 0].copy(), pair[:, 1].copy()
 
 
-def _model(anchors: Float):  # noqa: ANN202
-    return make_model(*_split(anchors), position_sigma_m=POSITION_SIGMA_M, rotation_sigma_rad=ROTATION_SIGMA_RAD)
+def _model(anchors: Float) -> BodyModel:
+    return make_model(*_split(anchors))
 
 
 def _prior(pairs: list[PairSolution], n_frames: int) -> Float:
-    """What holds the anchors where they were, (96, 96)."""
+    """Hold the anchors where they were, (96, 96)."""
     hold = np.zeros((96, 96))
     for k, pair in enumerate(pairs):
         at = slice(6 * k, 6 * k + 6)
@@ -104,8 +111,10 @@ def _prior(pairs: list[PairSolution], n_frames: int) -> Float:
     return hold
 
 
-def _normal_equations(anchors: Float, q: Float, root: Float, stream: Stream):  # noqa: ANN202
-    """Equations of the anchors with the frames eliminated, and the way back to the frames."""
+def _normal_equations(
+    anchors: Float, q: Float, root: Float, stream: Stream
+) -> tuple[Float, Float, Callable[[Float], Float]]:
+    """Set up the equations of the anchors with the frames eliminated, and the way back to the frames."""
     n, s = len(root), len(PARENT)
     cp, cc = _split(anchors)
     R = rotation.to_matrix(np.moveaxis(q, 1, 0))  # (17, N, 3, 3)
@@ -127,14 +136,14 @@ def _normal_equations(anchors: Float, q: Float, root: Float, stream: Stream):  #
     phi = rotation.log(rotation.mul(stream.rotation_wxyz, rotation.inv(q)))
     wp = np.sqrt(stream.weight * _kind(r, POSITION_SIGMA_M)) / POSITION_SIGMA_M
     wr = stream.weight * _kind(phi, ROTATION_SIGMA_RAD) / ROTATION_SIGMA_RAD**2
-    J_f = (J_f * wp[:, :, None, None]).reshape(n, 3 * s, -1)
-    J_a = (J_a * wp[:, :, None, None]).reshape(n, 3 * s, -1)
+    J_frame: Float = (J_f * wp[:, :, None, None]).reshape(n, 3 * s, -1)
+    J_anchor: Float = (J_a * wp[:, :, None, None]).reshape(n, 3 * s, -1)
     e = (r * wp[:, :, None]).reshape(n, 3 * s, 1)
-    J = np.concatenate([J_a, e], axis=-1)  # anchors and right side together
-    H_ff = J_f.mT @ J_f
+    J = np.concatenate([J_anchor, e], axis=-1)  # anchors and right side together
+    H_ff = J_frame.mT @ J_frame
     turn = np.arange(3, 3 + 3 * s)
     H_ff[:, turn, turn] += np.repeat(wr, 3, axis=1)
-    H_fa = J_f.mT @ J
+    H_fa = J_frame.mT @ J
     H_fa[:, 3:, -1] += np.repeat(wr, 3, axis=1) * phi.reshape(n, -1)
     flat = J.reshape(-1, 97)
     H_aa = flat.T @ flat
@@ -151,7 +160,8 @@ def _normal_equations(anchors: Float, q: Float, root: Float, stream: Stream):  #
 
 def _kind(residual: Float, sigma: float) -> Float:
     """Geman and McClure's weight."""
-    return 1.0 / (1.0 + np.sum(residual * residual, axis=-1) / (3.0 * sigma**2 * KINDNESS)) ** 2
+    weight: Float = 1.0 / (1.0 + np.sum(residual * residual, axis=-1) / (3.0 * sigma**2 * KINDNESS)) ** 2
+    return weight
 
 
 def _cross_matrix(v: Float) -> Float:

@@ -52,7 +52,7 @@ def calibrate(cleaned: Cleaned, *, has_adjustment: bool = True) -> Calibration:
 
 
 def bone_lengths(in_parent_sensor_m: Float, in_child_sensor_m: Float) -> Float:
-    """Distance from the parent segment's own joint to each joint, (16,) metres; midway between the hips for the pelvis."""
+    """Measure from the parent's own joint (midway between the hips for the pelvis) to each joint, (16,) metres."""
     hips = [JOINTS.index("l_thigh"), JOINTS.index("r_thigh")]
     start = np.concatenate([in_parent_sensor_m[hips].mean(axis=0)[None], in_child_sensor_m])
     way = in_parent_sensor_m - start[list(PARENT[1:])]

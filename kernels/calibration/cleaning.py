@@ -2,8 +2,8 @@
 
 Conventions
 -----------
-Series are (F, S, C): frames, sensors, components; every function works on all sensors at once. An entry is one sensor at
-one frame.
+Series are (F, S, C): frames, sensors, components; every function works on all sensors at once. An entry is one sensor
+at one frame.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def clean(recording: Recording, *, cutoff_hz: float = CUTOFF_HZ) -> Cleaned:
     turned = np.where(is_usable[..., None], recording.rotation_wxyz, rotation.IDENTITY)
     length = np.sqrt(np.sum(turned * turned, axis=-1, keepdims=True))
     turned = np.where(length > 1e-6, turned / np.maximum(length, 1e-6), rotation.IDENTITY)
-    is_usable &= length[..., 0] > 1e-6
+    is_usable = np.asarray(is_usable & (length[..., 0] > 1e-6))
     position, jumps = undo_hemispheres(position, is_usable, sensors=recording.sensors)
     findings += jumps
     is_outlier = find_outliers(position, turned, is_usable)
@@ -210,8 +210,8 @@ def low_pass(series: Float, frame_rate_hz: float, *, cutoff_hz: float = CUTOFF_H
 
 
 def _is_finite(recording: Recording) -> Bools:
-    finite: Bools = np.isfinite(recording.position_xyz_m).all(-1) & np.isfinite(recording.rotation_wxyz).all(-1)
-    return finite
+    finite = np.isfinite(recording.position_xyz_m).all(-1) & np.isfinite(recording.rotation_wxyz).all(-1)
+    return np.asarray(finite)
 
 
 def _aligned(rotation_wxyz: Float, is_good: Bools) -> Float:
@@ -219,9 +219,9 @@ def _aligned(rotation_wxyz: Float, is_good: Bools) -> Float:
     frame = np.arange(len(is_good))[:, None]
     last = np.maximum.accumulate(np.where(is_good, frame, 0), axis=0)
     held = np.take_along_axis(rotation_wxyz, last[..., None], axis=0)
-    sign = np.ones(is_good.shape)
-    sign[1:] = np.where(np.sum(held[1:] * held[:-1], axis=-1) < 0, -1.0, 1.0)
-    sign = np.cumprod(sign, axis=0)
+    flip = np.ones(is_good.shape)
+    flip[1:] = np.where(np.sum(held[1:] * held[:-1], axis=-1) < 0, -1.0, 1.0)
+    sign = np.cumprod(flip, axis=0)
     same = np.sum(rotation_wxyz * held, axis=-1) < 0  # what is not good follows the good one before it too
     return rotation_wxyz * np.where(same & ~is_good, -sign, sign)[..., None]
 
@@ -241,8 +241,8 @@ def _outlier_findings(recording: Recording, is_usable: Bools, is_outlier: Bools)
         if share > _MAX_OUTLIER_RATIO:
             first = int(np.flatnonzero(is_outlier[:, s])[0])
             sentence = (
-                f"{sensor}: want at most {_MAX_OUTLIER_RATIO:.0%} outliers, got {share:.1%}, the first at frame {first}; "
-                "look for a loose strap, a bad cable, or metal near the sensor"
+                f"{sensor}: want at most {_MAX_OUTLIER_RATIO:.0%} outliers, got {share:.1%}, the first at frame {first}"
+                "; look for a loose strap, a bad cable, or metal near the sensor"
             )
             findings.append(Finding("warning", sensor, first, sentence))
     return findings

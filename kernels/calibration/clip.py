@@ -114,7 +114,7 @@ def to_clip(poses: Poses, frame_rate_hz: float, *, gauge: Gauge | None = None) -
 
 
 def _rest_window(poses: Poses, up: Float, frame_rate_hz: float) -> tuple[int, int]:
-    """The half second in which the body stands straightest and stillest; of equal ones the first."""
+    """Find the half second in which the body stands straightest and stillest; of equal ones the first."""
     at = {name: k for k, name in enumerate(poses.joints)}
     p = poses.position_xyz_m
     f = len(p)

@@ -1,4 +1,4 @@
-"""What may be wrong with a recording before anything is computed from it, each fault with its sensor, frame and remedy."""
+"""What may be wrong with a recording before anything is computed from it: each fault with sensor, frame and remedy."""
 
 from __future__ import annotations
 
@@ -31,11 +31,12 @@ def check_recording(recording: Recording) -> tuple[Finding, ...]:
     """
     finite_p = np.isfinite(recording.position_xyz_m).all(-1)
     finite_q = np.isfinite(recording.rotation_wxyz).all(-1)
-    is_usable = recording.is_valid & finite_p & finite_q
+    is_finite = np.asarray(finite_p & finite_q)
+    is_usable = recording.is_valid & is_finite
     return (
         *_sensors(recording),
         *_frames(recording),
-        *_not_finite(recording, finite_p & finite_q),
+        *_not_finite(recording, is_finite),
         *_not_unit(recording, recording.is_valid & finite_q),
         *_units(recording, is_usable),
         *_dropped(recording, is_usable),

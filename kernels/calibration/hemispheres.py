@@ -49,13 +49,15 @@ def undo_hemispheres(
     signs = np.ones(is_usable.shape)
     for s in range(len(sensors)):
         signs[:, s] = _signs(turned[:, s], is_usable[:, s])
-    is_jumping = (signs < 0).any(axis=0)
+    is_jumping = np.asarray((signs < 0).any(axis=0))
     others = _middle(turned, is_usable & (signs > 0))
     for s in range(len(sensors)):
         here, there = _distances(turned[:, s] * signs[:, s, None], is_usable[:, s], others)
         if there < (1.0 if is_jumping[s] else _WHOLLY) * here:
             signs[:, s] *= -1
-    for s in np.flatnonzero((signs < 0).any(axis=0)):
+    for s in range(len(sensors)):
+        if (signs[:, s] > 0).all():
+            continue
         name, sign = sensors[s], signs[:, s]
         away = _distances(turned[:, s] * sign[:, None], is_usable[:, s], others)
         frame = int(np.flatnonzero(sign < 0)[0])

@@ -2,8 +2,8 @@
 
 Conventions
 -----------
-All pair problems live in one Gram matrix of ``[R_1 .. R_S | p_1 .. p_S]``, rows (frame, world axis): it holds every mean
-of R_i^T R_j, every right side and every squared distance.
+All pair problems live in one Gram matrix of ``[R_1 .. R_S | p_1 .. p_S]``, rows (frame, world axis): it holds every
+mean of R_i^T R_j, every right side and every squared distance.
 """
 
 from __future__ import annotations
@@ -39,13 +39,12 @@ def pair_residuals(rotation_matrix: Float, position_xyz_m: Float) -> Float:
     pp = G[3 * s :, 3 * s :]
     own = Rp[np.arange(s), np.arange(s)]
     b_i = Rp - own[:, None]
-    b_j = own[None] - Rp.transpose(1, 0, 2)
-    b_j = -b_j
+    b_j = Rp.transpose(1, 0, 2) - own[None]
     c_i, c_j = from_moments(M, b_i, b_j)[:2]
     d2 = np.diag(pp)[:, None] + np.diag(pp)[None] - 2 * pp
     square = d2 + np.sum(c_i**2 + c_j**2, axis=-1) - 2 * np.sum(c_i * np.matvec(M, c_j), axis=-1)
     square = square - 2 * np.sum(c_i * b_i + c_j * b_j, axis=-1)
-    residual = np.sqrt(np.maximum((square + square.T) / 2, 0.0))
+    residual: Float = np.sqrt(np.maximum((square + square.T) / 2, 0.0))
     np.fill_diagonal(residual, np.inf)
     return residual
 

@@ -2,9 +2,9 @@
 
 Conventions
 -----------
-Axes: ``F`` frames, ``S`` the 17 sensors in the order of :data:`SENSORS`. A segment is named after the sensor strapped to
-it, a joint after the segment it moves: ``l_forearm`` is the left elbow. Everything is in the recording's own world, in
-metres; rotations are ``wxyz``, from sensor to world.
+Axes: ``F`` frames, ``S`` the 17 sensors in the order of :data:`SENSORS`. A segment is named after the sensor strapped
+to it, a joint after the segment it moves: ``l_forearm`` is the left elbow. Everything is in the recording's own world,
+in metres; rotations are ``wxyz``, from sensor to world.
 """
 
 from __future__ import annotations

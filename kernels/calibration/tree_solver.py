@@ -24,6 +24,10 @@ FILLED_WEIGHT = 0.04
 DAMPING = 1e-3
 """Share of a rotation's weight added to each bone's equations."""
 
+POSITION_SIGMA_M = 0.005
+ROTATION_SIGMA_RAD = float(np.radians(1.5))
+"""How far sensors stray from their bones. Flat on purpose: estimates run away, for the poses soak up the residuals."""
+
 KINDNESS = 16.0
 """Squared residual, in variances, at which a measurement's weight falls to a quarter from the second step on."""
 
@@ -85,8 +89,8 @@ def make_model(
     in_parent_sensor_m: Float,
     in_child_sensor_m: Float,
     *,
-    position_sigma_m: Float | float = 0.005,
-    rotation_sigma_rad: Float | float = float(np.radians(1.5)),
+    position_sigma_m: Float | float = POSITION_SIGMA_M,
+    rotation_sigma_rad: Float | float = ROTATION_SIGMA_RAD,
 ) -> BodyModel:
     """Build the body from its joints as the sensors see them.
 
@@ -166,7 +170,8 @@ def solve_tree(model: BodyModel, stream: Stream, *, iterations: int = 2) -> Solv
         arm = [R[s] @ model.sensor_m[s] for s in range(n)]
         bone = [R[s if s == 0 else model.parent[s]] @ model.offset_m[s] for s in range(n)]
         p = _hang(model, root, bone)
-        A, B, C, g, h, X, K = ([None] * n for _ in range(7))
+        # of what hangs below each bone: its pull on the joint, and what the joint's movement gives the bone's turn
+        K, g, X = np.zeros((n, len(root), 3, 3)), np.zeros((n, len(root), 3)), np.zeros((n, len(root), 3, 4))
         for s in reversed(range(n)):
             r = measured[s] - p[s] - arm[s]
             phi = _rotation_residual(q[s], said[s])
@@ -191,8 +196,8 @@ def solve_tree(model: BodyModel, stream: Stream, *, iterations: int = 2) -> Solv
             X[s] = np.linalg.solve(C_s, np.concatenate([B_s.mT, h_s[..., None]], axis=-1))
             K[s] = A_s - B_s @ X[s][..., :3]
             g[s] = g_s - np.matvec(B_s, X[s][..., 3])
-            A[s] = B[s] = C[s] = h[s] = None
-        dp = [np.linalg.solve(K[0], g[0][..., None])[..., 0]] + [root] * (n - 1)
+        dp = np.zeros((n, *root.shape))
+        dp[0] = np.linalg.solve(K[0], g[0][..., None])[..., 0]
         turned = np.zeros((n, *root.shape))
         for s in range(n):
             if s > 0:
@@ -218,13 +223,15 @@ def _rotation_residual(q: Float, said: Float) -> Float:
     apart = rotation.mul(said, rotation.inv(q))
     v = apart[..., 1:] * np.where(apart[..., :1] < 0, -2.0, 2.0)
     square = 0.25 * np.sum(v * v, axis=-1, keepdims=True)
-    return v * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0))))
+    phi: Float = v * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0))))
+    return phi
 
 
 def _kind(residual: Float, sigma: float) -> Float:
     """Geman and McClure's weight."""
     u = np.sum(residual * residual, axis=-1) / (3.0 * sigma**2)
-    return 1.0 / (1.0 + u / KINDNESS) ** 2
+    weight: Float = 1.0 / (1.0 + u / KINDNESS) ** 2
+    return weight
 
 
 def _cross_matrix(v: Float) -> Float:

@@ -97,7 +97,7 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """How the bones move: world position (F, 3) of the pelvis and local rotations (F, 17, 4), the pelvis's in the world."""
+    """How bones move: world position (F, 3) of the pelvis, local rotations (F, 17, 4), the pelvis's in the world."""
 
     frame_rate_hz: float
     root_xyz_m: Float
@@ -294,7 +294,7 @@ def made_up(
     frozen: tuple[str, ...] = (),
     hinged: tuple[str, ...] = (),
 ) -> MadeUp:
-    """Record a made-up body going through its range of motion: :func:`make_body`, :func:`range_of_motion`, :func:`record`."""
+    """Record a made-up body going through its range of motion, all of one seed."""
     motion = range_of_motion(seed, n_frames=n_frames, size=size, frozen=frozen, hinged=hinged)
     return record(make_body(seed), motion, seed=seed, disturbance=disturbance)
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from kernels import rotation
 from kernels.assembly.blend import ease
+from kernels.calibration.records import SENSORS
 from kernels.skeleton.canonical import JOINTS as CANONICAL_JOINTS
 from kernels.skeleton.canonical import LEG_LENGTH_M
-from kernels.calibration.records import SENSORS
 from kernels.synthetic import dancer, suit
 from kernels.types import Clip, Float
 
@@ -27,8 +27,8 @@ _MADE_OF: dict[str, tuple[str, ...]] = {
     "shank": ("LowerLeg",),
     "foot": ("Foot",),
 }
-# What the canonical dancer holds stiff and a living one does not: standard deviation about x, y and z, degrees. The shin
-# turns about its own length and the foot turns back, so that soles stay where they are.
+# What the canonical dancer holds stiff and a living one does not: standard deviation about x, y and z, degrees. The
+# shin turns about its own length and the foot turns back, so that soles stay where they are.
 _ALIVE_DEG: dict[str, tuple[float, float, float]] = {
     "head": (5.0, 8.0, 10.0),
     "shoulder": (5.0, 1.5, 4.5),

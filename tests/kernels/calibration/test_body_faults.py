@@ -1,0 +1,58 @@
+import numpy as np
+import pytest
+
+from kernels.calibration.body_faults import find_body_faults, move_to_repeat
+from kernels.calibration.cleaning import clean
+from kernels.calibration.joints import solve_joints
+from kernels.calibration.records import SENSORS
+from kernels.synthetic import suit
+
+
+def faults(made):
+    cleaned = clean(made.recording)
+    return find_body_faults(cleaned, solve_joints(cleaned))
+
+
+def test_good_bodies_have_none(cleaned, pairs):
+    assert find_body_faults(cleaned, pairs) == ()
+
+
+def test_a_joint_that_does_not_move_is_an_error_with_a_remedy():
+    found = faults(suit.made_up(3, n_frames=2500, frozen=("head",)))
+    assert [(one.severity, one.sensor) for one in found] == [("error", "head")]
+    assert "head rolls" in found[0].sentence
+
+
+def test_an_exact_hinge_is_a_warning():
+    found = faults(suit.made_up(3, n_frames=3000, hinged=("l_shank", "r_shank")))
+    assert [(one.severity, one.sensor) for one in found] == [("warning", "l_shank"), ("warning", "r_shank")]
+
+
+@pytest.mark.parametrize(("one", "other"), [("pelvis", "r_foot"), ("thorax", "head"), ("l_hand", "r_hand")])
+def test_exchanged_labels_are_both_named(made, one, other):
+    cleaned = clean(suit.swap(made.recording, {one: other}))
+    found = find_body_faults(cleaned, solve_joints(cleaned))
+    assert found[0].severity == "error"
+    assert {one, other} == set(found[0].sentence.split(":")[0].split(", "))
+
+
+def test_the_world_may_be_turned(made, pairs, cleaned):
+    # a rule that used the direction of gravity would fail here
+    turn = np.array([0.5, -0.5, 0.5, 0.5])
+    from dataclasses import replace
+
+    from kernels import rotation
+
+    turned = replace(
+        cleaned,
+        recording=replace(
+            cleaned.recording,
+            position_xyz_m=rotation.apply(turn, cleaned.recording.position_xyz_m),
+            rotation_wxyz=rotation.mul(turn, cleaned.recording.rotation_wxyz),
+        ),
+    )
+    assert find_body_faults(turned, pairs) == ()
+
+
+def test_there_is_a_movement_for_every_joint():
+    assert len({move_to_repeat(name) for name in SENSORS[1:]}) == 9
