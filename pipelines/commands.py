@@ -251,7 +251,7 @@ def status(root: Path) -> Outcome:
     """Say what is fresh, stale, failed or refused."""
     studio = existing(root)
     state = freshness(studio)
-    clips, songs = _clips(state, studio), _songs(state, studio)
+    (clips, doubts), songs = _clips_and_doubts(state, studio), _songs(state, studio)
     findings = state.findings()
     assets = [
         {"asset": f.asset, "partition": f.key, "group": state.assets[f.asset].group, "state": f.state, "why": f.why}
@@ -259,8 +259,8 @@ def status(root: Path) -> Outcome:
     ]
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
     notes = list(state.sources.notes)
-    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes}
-    report = _status_report(studio, clips, songs, assets, refused, notes)
+    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes, "warnings": doubts}
+    report = _status_report(studio, clips, songs, assets, refused, notes, doubts)
     return Outcome(SOME_REFUSED if refused else DONE, facts, report)
 
 
@@ -271,6 +271,7 @@ def _status_report(
     assets: list[dict[str, Any]],
     refused: list[dict[str, Any]],
     notes: list[str],
+    doubts: list[dict[str, str]],
 ) -> str:
     lines = [f"studio {studio.root}"]
     for name, files in (("clips", clips), ("songs", songs)):
@@ -283,7 +284,7 @@ def _status_report(
     lines += [f"    {a['state']}: {a['asset']}[{a['partition']}]: {a['why']}" for a in unfresh[:LONGEST_LIST]]
     lines += _more(unfresh)
     lines += [f"  {line}" for line in _refusals(refused)]
-    doubtful = [f"    warning: {clip['path']}: {warning}" for clip in clips for warning in clip["warnings"]]
+    doubtful = [f"  warning: {doubt['path']}: {doubt['warning']}" for doubt in doubts]
     lines += doubtful[:LONGEST_LIST] + _more(doubtful)
     lines += [f"  note: {note}" for note in notes]
     return "\n".join(lines)
@@ -291,20 +292,27 @@ def _status_report(
 
 def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
     """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
+    return _clips_and_doubts(state, studio)[0]
+
+
+def _clips_and_doubts(state: Freshness, studio: StudioFolder) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+    """List the motion files, and what is doubtful about those that were read."""
     stored = {}
     for session in studio.lake.keys("clip"):
         if studio.lake.stamp("clip", session) is None:  # of an older version: as if it were not there
             continue
         for row in studio.lake.table("clip", session).to_pylist():
             stored[row["path"]] = row
-    found = []
+    found: list[dict[str, Any]] = []
+    doubts: list[dict[str, str]] = []
     for clip in state.sources.clips:
         path = clip.path.encode("utf-8", "backslashreplace").decode()
         row = stored.get(path)
         seen = _seen(row, clip.sha256, clip.problem)
         warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
-        found.append({"path": path, "key": clip.key, "session": clip.session, **seen, "warnings": warnings})
-    return found
+        found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
+        doubts += [{"path": path, "warning": sentence} for sentence in warnings]
+    return found, doubts
 
 
 def _songs(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:

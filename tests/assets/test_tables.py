@@ -168,3 +168,8 @@ def test_dance_and_lineage_round_trip():
     again = tables.to_dance(pose, line, back)
     np.testing.assert_allclose(again.position_xyz_m, dance.position_xyz_m, atol=1e-6)
     np.testing.assert_array_equal(again.lineage.step_index, dance.lineage.step_index)
+
+
+def test_quaternions_one_a_row():
+    values = np.arange(12.0).reshape(3, 4)
+    np.testing.assert_array_equal(tables.to_array(tables.quaternion(values)), values)

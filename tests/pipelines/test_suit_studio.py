@@ -103,8 +103,9 @@ def test_everything_is_fresh_and_status_says_what_is_doubtful(built_suit):
     root, _ = built_suit
     assert all(f.state == "fresh" for f in freshness(StudioFolder(root)).findings())
     status = commands.status(root)
-    clips = {Path(clip["path"]).name: clip for clip in status.facts["clips"]}
-    assert all(isinstance(clip["warnings"], list) for clip in clips.values())
+    said = [(doubt["path"], doubt["warning"]) for doubt in status.facts["warnings"]]
+    assert said == [("clips/suit/medley.parquet", warning) for warning in rows(root)["medley.parquet"]["warnings"]]
+    assert all(f"warning: {path}: {warning}" in status.report for path, warning in said)
     assert "refused: clips/suit/frozen.csv: " in status.report
 
 
