@@ -21,7 +21,7 @@ from kernels.calibration.records import Bools, Cleaned, Finding, Recording
 from kernels.types import Float
 
 CUTOFF_HZ = 12.0
-_NORM_3D, _NORM_4D = 1.538, 1.0  # median length of a vector of independent normal components, in their deviation
+_LEAST_M, _LEAST_QUATERNION = 0.015, 0.05
 _MAX_OUTLIER_RATIO = 0.05
 # Exchanges of a network after which the fifth of nine is their median (Devillard, 1998).
 _NETWORK = "12 45 78 01 34 67 12 45 78 03 58 47 36 14 25 47 42 64 42"  # pairs of places, smaller to the first
@@ -113,24 +113,46 @@ def find_outliers(position_xyz_m: Float, rotation_wxyz: Float, is_usable: Bools,
 
     Notes
     -----
-    Hampel's rule: an entry is an outlier where it lies further from the median of nine frames than ten times what the
+    Hampel's rule: an entry is an outlier where it lies further from the median of nine frames than six times what the
     sensor usually does, and than five times what it does within 20 frames, so that fast turns are not taken for
-    outliers; but never within 1 cm, or 0.05 in the quaternion.
+    outliers; but never within 15 mm, or 0.05 in the quaternion. The first and last four frames are held against a line
+    through the medians next to them, four times as loosely: an outlier at an end must not vouch for itself.
     """
     is_outlier = np.zeros_like(is_usable)
     for _ in range(rounds):
         is_good = is_usable & ~is_outlier
         found = np.zeros_like(is_usable)
-        for series, floor in ((position_xyz_m, 0.0102), (_aligned(rotation_wxyz, is_good), 0.05)):
-            away = np.sqrt(np.sum((series - running_median(fill(series, is_good))) ** 2, axis=-1))
+        for series, floor in ((position_xyz_m, _LEAST_M), (_aligned(rotation_wxyz, is_good), _LEAST_QUATERNION)):
+            away = np.sqrt(np.sum((series - _expected(fill(series, is_good))) ** 2, axis=-1))
             usual = _median_where(away, is_good)
-            near = running_median(np.where(is_good, away, usual), stride=5)
-            found |= away > np.maximum(floor, np.maximum(6.0 * usual, 5.0 * near))
+            near = _nearby(np.where(is_good, away, usual))
+            least = np.full((len(away), 1), floor)
+            least[:4], least[-4:] = 4 * floor, 4 * floor
+            found |= away > np.maximum(least, np.maximum(6.0 * usual, 5.0 * near))
         found &= is_good
         if not found.any():
             break
         is_outlier |= found
     return is_outlier
+
+
+def _expected(series: Float) -> Float:
+    """Take the running median (F, S, C), drawn on in a line over the first and last four frames."""
+    middle = running_median(series)
+    if len(series) < 18:
+        return middle
+    step = np.arange(1, 5)[:, None, None]
+    middle[3::-1] = middle[4] - step * (middle[8] - middle[4]) / 4.0
+    middle[-4:] = middle[-5] + step * (middle[-5] - middle[-9]) / 4.0
+    return middle
+
+
+def _nearby(away: Float) -> Float:
+    """Median (F, S) over nine samples within 20 frames; at the ends that of frame 20."""
+    near = running_median(away, stride=5)
+    if len(away) > 40:
+        near[:20], near[-20:] = near[20], near[-21]
+    return near
 
 
 def fill(series: Float, is_good: Bools) -> Float:

@@ -37,4 +37,4 @@ def poses(cleaned, calibration):
 @pytest.fixture(scope="session")
 def perfect():
     """Without noise, outliers or gaps."""
-    return suit.made_up(8, n_frames=1200, disturbance=suit.CLEAN)
+    return suit.made_up(8, n_frames=3000, disturbance=suit.CLEAN)
