@@ -151,7 +151,8 @@ def calibration(joints: pa.Table) -> bytes:
     names = joints["joint_name"].to_pylist()
     before, after = (to_curves(joints[f"gap_{when}_curve_m"]) for when in ("before", "after"))
     figure = _figure(12, 6.5)
-    left, right = np.ravel(figure.subfigures(1, 2, width_ratios=(1.7, 1)))
+    halves: Any = figure.subfigures(1, 2, width_ratios=(1.7, 1))
+    left, right = halves
     heat, gap = left.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     most_mm = max(float(np.percentile(1000 * before, 99)) if before.size else 0.0, 1.0)
     span_s = joints["span_s"][0].as_py()
