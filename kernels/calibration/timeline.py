@@ -183,7 +183,8 @@ def collapse(time_s: Float, values: Float) -> Collapsed:
     -------
     Collapsed
         A sample begins where the sensor that opens a round says something new: of those heard most often, the one
-        that the longest waits precede. A sensor that hardly ever changes counts as heard.
+        that the longest waits precede; and, while that one is not heard, where another speaks a second time. A sensor
+        that hardly ever changes counts as heard.
     """
     same = (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
     is_new = np.concatenate([np.ones((1, values.shape[1]), bool), ~same.all(axis=-1)])
@@ -191,7 +192,26 @@ def collapse(time_s: Float, values: Float) -> Collapsed:
     wait_s = np.diff(time_s, prepend=time_s[0])
     often = np.flatnonzero(count >= 0.95 * count.max() - 1)
     opener = often[np.argmax([np.median(wait_s[is_new[:, s]]) for s in often])]
-    first = np.flatnonzero(is_new[:, opener])
+    first = _rounds(is_new, opener)
     heard = np.add.reduceat(is_new, first, axis=0) > 0
     heard[:, count < 0.5 * len(first)] = True
     return Collapsed(np.append(first[1:], len(time_s)) - 1, first, heard)
+
+
+def _rounds(is_new: NDArray[np.bool_], opener: int) -> Int:
+    """First rows of the rounds in which every sensor speaks once."""
+    first = np.flatnonzero(is_new[:, opener])
+    spoken = is_new.copy()
+    spoken[0] = False  # what stands in the first row may be a word of the round before
+    often = np.add.reduceat(spoken, first, axis=0, dtype=np.int64).max(axis=1) > 1
+    more: list[int] = []
+    end = np.append(first[1:], len(is_new))
+    for start, stop in zip(first[often].tolist(), end[often].tolist(), strict=True):
+        heard = spoken[start].copy()
+        for row in range(start + 1, stop):
+            if (spoken[row] & heard).any():
+                more.append(row)
+                heard = spoken[row].copy()
+            else:
+                heard |= spoken[row]
+    return np.sort(np.concatenate([first, np.array(more, np.int64)]))

@@ -125,6 +125,15 @@ def test_collapse_of_rows_that_are_all_new_changes_nothing():
     np.testing.assert_array_equal(seen.row, np.arange(5))
 
 
+def test_rounds_go_on_while_their_opener_is_not_heard():
+    a, b = np.repeat(np.arange(1.0, 13.0), 2), np.repeat(np.arange(1.0, 13.0), 2)
+    a[8:14] = np.nan
+    seen = collapse(np.arange(24) / 240, np.stack([a, b], 1)[..., None])
+    np.testing.assert_array_equal(seen.row, np.arange(1, 24, 2))
+    assert seen.is_new[:, 1].all()
+    assert np.flatnonzero(~seen.is_new[:, 0]).tolist() == [5, 6]  # the first row of nothing is news too
+
+
 def test_nothing_said_again_is_no_news():
     values = np.array([[[1.0], [np.nan]], [[2.0], [np.nan]], [[3.0], [np.nan]]])
     seen = collapse(np.arange(3.0), values)
