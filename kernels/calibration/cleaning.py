@@ -22,6 +22,7 @@ from kernels.types import Float
 
 CUTOFF_HZ = 12.0
 _LEAST_M, _LEAST_QUATERNION = 0.015, 0.05
+_TURN_M_PER_S2, _TURN_RAD_PER_S2 = 30.0, 100.0
 _MAX_OUTLIER_RATIO = 0.05
 # Exchanges of a network after which the fifth of nine is their median (Devillard, 1998).
 _NETWORK = "12 45 78 01 34 67 12 45 78 03 58 47 36 14 25 47 42 64 42"  # pairs of places, smaller to the first
@@ -51,7 +52,7 @@ def clean(recording: Recording, *, cutoff_hz: float = CUTOFF_HZ) -> Cleaned:
     is_usable = np.asarray(is_usable & (length[..., 0] > 1e-6))
     position, jumps = undo_hemispheres(position, is_usable, sensors=recording.sensors)
     findings += jumps
-    is_outlier = find_outliers(position, turned, is_usable)
+    is_outlier = find_outliers(position, turned, is_usable, frame_rate_hz=recording.frame_rate_hz)
     is_good = is_usable & ~is_outlier
     position, turned = fill(position, is_good), fill(_aligned(turned, is_good), is_good)
     turned = rotation.continuous(rotation.normalize(turned))
@@ -95,7 +96,9 @@ def running_median(series: Float, *, stride: int = 1) -> Float:
     return tap[4]
 
 
-def find_outliers(position_xyz_m: Float, rotation_wxyz: Float, is_usable: Bools, *, rounds: int = 3) -> Bools:
+def find_outliers(
+    position_xyz_m: Float, rotation_wxyz: Float, is_usable: Bools, *, frame_rate_hz: float, rounds: int = 3
+) -> Bools:
     """Mark entries that stand out from the frames around them.
 
     Parameters
@@ -103,6 +106,7 @@ def find_outliers(position_xyz_m: Float, rotation_wxyz: Float, is_usable: Bools,
     position_xyz_m : (F, S, 3) float, metres
     rotation_wxyz : (F, S, 4) float, unit
     is_usable : (F, S) bool
+    frame_rate_hz : float, > 0
     rounds : int, >= 1
         What is marked is filled and the rest looked at again: bursts fall from their ends.
 
@@ -115,14 +119,19 @@ def find_outliers(position_xyz_m: Float, rotation_wxyz: Float, is_usable: Bools,
     -----
     Hampel's rule: an entry is an outlier where it lies further from the median of nine frames than six times what the
     sensor usually does, and than five times what it does within 20 frames, so that fast turns are not taken for
-    outliers; but never within 15 mm, or 0.05 in the quaternion. The first and last four frames are held against a line
+    outliers; but never within 15 mm, or 0.05 in the quaternion,
+    nor within what 30 m/s² and 100 rad/s² do in two frames. The first and last four frames are held against a line
     through the medians next to them, four times as loosely: an outlier at an end must not vouch for itself.
     """
     is_outlier = np.zeros_like(is_usable)
+    # at a turn the median of nine lies as far off as the body gets in two frames
+    turn_s2 = (2.0 / frame_rate_hz) ** 2
+    least_m = max(_LEAST_M, _TURN_M_PER_S2 * turn_s2 / 2)
+    least_q = max(_LEAST_QUATERNION, _TURN_RAD_PER_S2 * turn_s2 / 4)
     for _ in range(rounds):
         is_good = is_usable & ~is_outlier
         found = np.zeros_like(is_usable)
-        for series, floor in ((position_xyz_m, _LEAST_M), (_aligned(rotation_wxyz, is_good), _LEAST_QUATERNION)):
+        for series, floor in ((position_xyz_m, least_m), (_aligned(rotation_wxyz, is_good), least_q)):
             away = np.sqrt(np.sum((series - _expected(fill(series, is_good))) ** 2, axis=-1))
             usual = _median_where(away, is_good)
             near = _nearby(np.where(is_good, away, usual))

@@ -45,9 +45,9 @@ def test_fast_turns_are_not_outliers():
     place = np.zeros((600, 1, 3))
     place[:, 0, 0] = 0.3 * np.sin(2 * np.pi * 2.5 * time_s)  # 74 m/s² at the ends
     still = np.tile(rotation.IDENTITY, (600, 1, 1))
-    assert not find_outliers(place, still, np.ones((600, 1), bool))[4:-4].any()
+    assert not find_outliers(place, still, np.ones((600, 1), bool), frame_rate_hz=120.0)[4:-4].any()
     gentle = 0.4 * place  # at the very ends half as much is known
-    assert not find_outliers(gentle, still, np.ones((600, 1), bool)).any()
+    assert not find_outliers(gentle, still, np.ones((600, 1), bool), frame_rate_hz=120.0).any()
 
 
 def test_what_comes_out_is_whole_unit_and_continuous(made, cleaned):
@@ -107,5 +107,11 @@ def test_an_outlier_at_an_end_does_not_vouch_for_itself():
     place[:, 0, 0] = np.arange(200) / 60  # 2 m/s
     place[[0, 1, -1], 0, 1] = 0.2
     still = np.tile(rotation.IDENTITY, (200, 1, 1))
-    found = find_outliers(place, still, np.ones((200, 1), bool))
+    found = find_outliers(place, still, np.ones((200, 1), bool), frame_rate_hz=120.0)
     np.testing.assert_array_equal(np.flatnonzero(found), [0, 1, 199])
+
+
+def test_slow_trackers_raise_no_alarm():
+    body = suit.make_body(4)
+    made = suit.record(body, suit.range_of_motion(4, n_frames=2000, frame_rate_hz=30.0), seed=4)
+    assert clean(made.recording).findings == ()
