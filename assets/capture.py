@@ -1,11 +1,14 @@
-"""From the files under ``clips/`` to clips, skeletons and poses, file by file."""
+"""From the files under ``clips/`` to clips, skeletons and poses, file by file: parsed, or calibrated from a suit."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import dagster as dg
 import pyarrow as pa
 
-from assets import tables
+from assets import plots, tables
+from assets.calibration import CalibrationError, Solvers, calibrate_file, up_axis
+from assets.calibration_table import from_calibration
 from assets.declare import table_assets
 from assets.formats import bvh
 from assets.formats.errors import FormatError
@@ -22,22 +25,25 @@ from assets.lineage import (
 from assets.partitions import SESSION, lake_key
 from assets.sources import Clip, Studio, session_version
 from kernels.skeleton.naming import map_joints
+from kernels.types import Clip as Motion
+from schemas.calibration import CALIBRATION
 from schemas.motion import CLIP, POSE, SKELETON
 
 
 @table_assets(
     "capture",
     # Poses first: they are made one session at a time while they are stored, and leave the small tables behind.
-    (POSE, SKELETON, CLIP),
+    (POSE, SKELETON, CALIBRATION, CLIP),
     group="capture",
-    code_version="1",
-    settings="joints limits",
+    code_version="2",
+    settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,
 )
 def capture(
     context: dg.AssetExecutionContext,
     studio: dg.ResourceParam[Studio],
+    solvers: dg.ResourceParam[Solvers],
     earlier: dg.ResourceParam[Earlier],
     progress: dg.ResourceParam[Progress],
 ) -> Iterator[dg.Output[Parts]]:
@@ -45,14 +51,14 @@ def capture(
     sessions = studio.sources().sessions()
     keys = [lake_key(key) for key in context.partition_keys]
     progress.begin("reading clips", sum(len(sessions.get(key, ())) for key in keys))
-    reader = _Reader(studio, earlier, progress, code_version(context, CLIP.name))
-    small: dict[str, list[Part]] = {SKELETON.name: [], CLIP.name: []}
+    reader = _Reader(studio, solvers, earlier, progress, code_version(context, CLIP.name))
+    small: dict[str, list[Part]] = {table.name: [] for table in (SKELETON, CALIBRATION, CLIP)}
 
     def poses() -> Iterator[Part]:
         for key in keys:
             parts = reader.read(key, sessions.get(key, ()))
-            small[SKELETON.name].append(parts[SKELETON.name])
-            small[CLIP.name].append(parts[CLIP.name])
+            for name, made in small.items():
+                made.append(parts[name])
             yield parts[POSE.name]
 
     yield dg.Output(Parts(poses()), POSE.name)
@@ -63,29 +69,46 @@ def capture(
 _UNREAD = "cannot be read"
 
 
+@dataclass(frozen=True, eq=False)
+class _Reading:
+    """What a file came to: its row, and its rows in the tables of skeletons, poses and calibrations."""
+
+    row: dict[str, object]
+    skeleton: pa.Table
+    pose: pa.Table
+    calibration: pa.Table
+
+
 class _Reader:
     """Reads sessions, carrying over what an earlier run read of files with the same bytes."""
 
-    def __init__(self, studio: Studio, earlier: Earlier, progress: Progress, code: str) -> None:
-        self._studio, self._earlier, self._progress = studio, earlier, progress
-        self._joints = studio.settings().joints
-        self._max_bytes = int(studio.settings().limits.largest_clip_mb * 1e6)
-        self._reading = version_of(code, repr(sorted(self._joints.items())))
+    def __init__(self, studio: Studio, solvers: Solvers, earlier: Earlier, progress: Progress, code: str) -> None:
+        self._studio, self._solvers, self._earlier, self._progress = studio, solvers, earlier, progress
+        self._settings = studio.settings()
+        self._max_bytes = int(self._settings.limits.largest_clip_mb * 1e6)
+        joints = repr(sorted(self._settings.joints.items()))
+        sensors = repr(sorted(self._settings.sensors.items()))
+        self._made_by = {
+            "bvh": version_of(code, joints),
+            "suit": version_of(code, joints, sensors, repr(self._settings.calibration)),
+        }
 
     def read(self, session: str, clips: tuple[Clip, ...]) -> dict[str, Part]:
-        """Make the three tables of one session."""
+        """Make the tables of one session."""
         known = self._carried(session)
         rows, stamps, n_read = [], {}, 0
-        skeletons, poses = {}, {}
         is_unread = False
+        found: dict[str, _Reading] = {}
         for clip in clips:
-            made_from = version_of(self._reading, clip.sha256)
+            made_from = version_of(self._made_by[clip.kind], clip.sha256)
             if clip.problem:
                 row = _refused(clip.problem)
             elif clip.key in known and known[clip.key][0] == made_from:
-                _, row, skeletons[clip.key], poses[clip.key] = known[clip.key]
+                found[clip.key] = known[clip.key][1]
+                row = found[clip.key].row
             else:
-                row, skeletons[clip.key], poses[clip.key] = self._parse(clip)
+                found[clip.key] = self._calibrate(clip) if clip.kind == "suit" else self._parse(clip)
+                row = found[clip.key].row
                 n_read += 1
                 is_unread |= row["state"] == "refused" and str(row["reason"]).startswith(_UNREAD)
             rows.append(_row(clip, row))
@@ -96,62 +119,130 @@ class _Reader:
         refused = [f"{r['path']}: {r['reason']}" for r in rows if r["state"] == "refused"]
         # What the disk refused may be readable next time: such a session is never taken for fresh.
         version = version_of(session_version(clips), "unread") if is_unread else session_version(clips)
+        doubtful = [f"{r['path']}: {w}" for r in rows for w in r["warnings"]]  # type: ignore[attr-defined]
         by_clip = {row["clip_id"]: tables.from_rows(CLIP, [row]) for row in rows if row["source_sha256"]}
-        return {
-            POSE.name: Part(session, tables.concat(POSE, _filled(poses)), version, _stamps(stamps, poses), counts),
-            SKELETON.name: Part(
-                session, tables.concat(SKELETON, _filled(skeletons)), version, _stamps(stamps, skeletons)
-            ),
-            CLIP.name: Part(
-                session,
-                tables.from_rows(CLIP, rows),
-                version,
-                _stamps(stamps, {key: by_clip[key] for key in stamps}),
-                counts | {"refused_clips": len(refused), "refusals": dg.MetadataValue.md(_listed(refused))},
-            ),
+        made = {
+            POSE.name: {key: reading.pose for key, reading in found.items()},
+            SKELETON.name: {key: reading.skeleton for key, reading in found.items()},
+            CALIBRATION.name: {key: reading.calibration for key, reading in found.items()},
         }
+        parts = {
+            table.name: Part(
+                session,
+                tables.concat(table, _filled(made[table.name])),
+                version,
+                _stamps(stamps, made[table.name]),
+                counts if table is POSE else {},
+            )
+            for table in (POSE, SKELETON)
+        }
+        calibration = tables.concat(CALIBRATION, _filled(made[CALIBRATION.name]))
+        parts[CALIBRATION.name] = Part(
+            session,
+            calibration,
+            version,
+            _stamps(stamps, made[CALIBRATION.name]),
+            {"calibrations": dg.MetadataValue.md(plots.calibrations(calibration, doubtful))},
+        )
+        parts[CLIP.name] = Part(
+            session,
+            tables.from_rows(CLIP, rows),
+            version,
+            _stamps(stamps, {key: by_clip[key] for key in stamps}),
+            counts
+            | {
+                "refused_clips": len(refused),
+                "refusals": dg.MetadataValue.md(_listed(refused)),
+                "warnings": dg.MetadataValue.md(_listed(doubtful)),
+            },
+        )
+        return parts
 
-    def _carried(self, session: str) -> dict[str, tuple[str, dict[str, object], pa.Table, pa.Table]]:
-        """Look up what is known of each clip: what it was read from, its row, its skeleton, its pose."""
-        stamps = [self._earlier.stamp(table.name, session) for table in (POSE, SKELETON, CLIP)]
-        clip, skeleton, pose = (self._earlier.table(t.name, session) for t in (CLIP, SKELETON, POSE))
-        if any(stamp is None for stamp in stamps) or clip is None or skeleton is None or pose is None:
+    def _carried(self, session: str) -> dict[str, tuple[str, _Reading]]:
+        """Look up what is known of each clip: what it was read from, and its rows."""
+        order = (CLIP, SKELETON, POSE, CALIBRATION)
+        stamps = [self._earlier.stamp(table.name, session) for table in order]
+        stored = [self._earlier.table(table.name, session) for table in order]
+        if any(stamp is None for stamp in stamps) or any(table is None for table in stored):
             return {}
-        # The three are stored one after the other: after a kill in between they may be of different readings.
+        # They are stored one after the other: after a kill in between they may be of different readings.
         made_from = [{c: s.made_from for c, s in stamp.clips.items()} for stamp in stamps if stamp]
         agreed = {c for c, version in made_from[0].items() if all(m.get(c) == version for m in made_from)}
-        skeletons, poses = tables.by_clip(skeleton), tables.by_clip(pose)
+        clip, *parts = stored
+        of = [tables.by_clip(part) for part in parts]
+        nothing = [table.empty() for table in order[1:]]
         return {
             row["clip_id"]: (
                 made_from[0][row["clip_id"]],
-                row,
-                skeletons.get(row["clip_id"], SKELETON.empty()),
-                poses.get(row["clip_id"], POSE.empty()),
+                _Reading(row, *(o.get(row["clip_id"], n) for o, n in zip(of, nothing, strict=True))),
             )
-            for row in clip.to_pylist()
+            for row in clip.to_pylist()  # type: ignore[union-attr]
             if row["clip_id"] in agreed and row["source_sha256"]
         }
 
-    def _parse(self, source: Clip) -> tuple[dict[str, object], pa.Table, pa.Table]:
+    def _parse(self, source: Clip) -> _Reading:
         try:
-            take = bvh.to_clip(bvh.read(self._studio.file(source.path), max_bytes=self._max_bytes), extra=self._joints)
-            mapping = take.mapping or map_joints(take.clip.skeleton, self._joints)
+            read = bvh.read(self._studio.file(source.path), max_bytes=self._max_bytes)
+            take = bvh.to_clip(read, extra=self._settings.joints)
+            mapping = take.mapping or map_joints(take.clip.skeleton, self._settings.joints)
         except (FormatError, ValueError, OSError) as error:
-            return _refused(_sentence(error)), SKELETON.empty(), POSE.empty()
-        clip, world = take.clip, take.world
-        row: dict[str, object] = {
-            "frame_rate_hz": clip.frame_rate_hz,
-            "frame_count": clip.n_frames,
-            "duration_s": clip.duration_s,
-            "state": "read",
-            "reason": None,
-            "joint_count": len(clip.skeleton.joints),
-            "metres_per_unit": world.metres_per_unit,
-            "up_axis": world.up_axis,
-            "root_offset_rule": world.root_offset_rule,
-            "naming_family": mapping.family,
-        }
-        return row, tables.from_skeleton(source.key, clip.skeleton, mapping), tables.from_pose(source.key, clip)
+            return _nothing(_sentence(error))
+        row = _read(
+            take.clip,
+            metres_per_unit=take.world.metres_per_unit,
+            up_axis=take.world.up_axis,
+            root_offset_rule=take.world.root_offset_rule,
+            naming_family=mapping.family,
+        )
+        return _Reading(
+            row,
+            tables.from_skeleton(source.key, take.clip.skeleton, mapping),
+            tables.from_pose(source.key, take.clip),
+            CALIBRATION.empty(),
+        )
+
+    def _calibrate(self, source: Clip) -> _Reading:
+        try:
+            found = calibrate_file(
+                self._studio.file(source.path),
+                settings=self._settings.calibration,
+                sensors=self._settings.sensors,
+                solvers=self._solvers,
+            )
+            mapping = map_joints(found.clip.skeleton, self._settings.joints)
+        except (FormatError, CalibrationError, ValueError, OSError) as error:
+            return _nothing(_sentence(error))
+        row = _read(
+            found.clip,
+            metres_per_unit=found.suit.metres_per_unit,
+            up_axis=up_axis(found.gauge),
+            root_offset_rule="",
+            naming_family=mapping.family,
+            warnings=list(found.warnings),
+        )
+        return _Reading(
+            row,
+            tables.from_skeleton(source.key, found.clip.skeleton, mapping),
+            tables.from_pose(source.key, found.clip),
+            from_calibration(source.key, found),
+        )
+
+
+def _read(clip: Motion, **said: object) -> dict[str, object]:
+    return {
+        "frame_rate_hz": clip.frame_rate_hz,
+        "frame_count": clip.n_frames,
+        "duration_s": clip.duration_s,
+        "state": "read",
+        "reason": None,
+        "joint_count": len(clip.skeleton.joints),
+        "warnings": [],
+        **said,
+    }
+
+
+def _nothing(reason: str) -> _Reading:
+    return _Reading(_refused(reason), SKELETON.empty(), POSE.empty(), CALIBRATION.empty())
 
 
 def _refused(reason: str) -> dict[str, object]:
@@ -159,7 +250,7 @@ def _refused(reason: str) -> dict[str, object]:
         ("frame_rate_hz", "duration_s", "metres_per_unit"), 0.0
     )
     texts = dict.fromkeys(("up_axis", "root_offset_rule", "naming_family"), "")
-    return {**nothing, **texts, "state": "refused", "reason": reason}
+    return {**nothing, **texts, "state": "refused", "reason": reason, "warnings": []}
 
 
 def _row(clip: Clip, reading: dict[str, object]) -> dict[str, object]:
@@ -170,6 +261,7 @@ def _row(clip: Clip, reading: dict[str, object]) -> dict[str, object]:
         "session": clip.session,
         "path": clip.path.encode("utf-8", "backslashreplace").decode(),
         "source_sha256": clip.sha256,
+        "source_format": clip.kind if clip.sha256 else "",
         "label": facts.label,
         "style": facts.style,
         "subject": facts.subject,

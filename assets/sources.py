@@ -13,19 +13,22 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from assets.formats import clips_csv, settings, tree
+from assets.formats import clips_csv, settings, suit, tree
 from assets.formats.clips_csv import Facts
 from assets.formats.errors import FormatError
 from assets.formats.tree import File, HashCache
 from schemas.keys import clip_key, part_key, part_of, parts_in_use, session_key, song_key
 from schemas.settings import Brief, Settings
 
-MOTION_SUFFIXES = (".bvh",)
+MOTION_SUFFIXES = (".bvh", *suit.SUFFIXES)
+# What `odori calibrate` leaves beside a recording is no recording.
+POSES_ENDING = ".poses.parquet"
 AUDIO_SUFFIXES = (".wav", ".flac", ".ogg", ".mp3")
 MIDI_SUFFIXES = (".mid", ".midi")
 # Said beside sources, not sources themselves.
 DOCUMENT_SUFFIXES = (".txt", ".md", ".pdf", ".json", ".toml", ".csv", ".beats", ".html", ".rtf", ".copyright", "")
 LARGEST_SESSION = 256
+_MOTION = "a BVH file (.bvh) or a suit recording (.parquet, .csv)"
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,11 @@ class Clip:
     sha256: str
     facts: Facts
     problem: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Whether it is a ``"bvh"`` or the recording of a ``"suit"``."""
+        return "suit" if self.path.lower().endswith(suit.SUFFIXES) else "bvh"
 
 
 @dataclass(frozen=True)
@@ -175,7 +183,7 @@ def _clips(
     root = studio / "clips"
     files = tree.walk(root, notes)
     facts = _facts(root, [f for f in files if clips_csv.is_clips_csv(f.name)], notes)
-    sources = [f for f in files if f.suffix not in DOCUMENT_SUFFIXES]
+    sources = [f for f in files if _is_motion(root, f, notes)]
     by_folder: dict[tuple[str, ...], list[File]] = defaultdict(list)
     for file in sources:
         by_folder[file.folders].append(file)
@@ -188,12 +196,26 @@ def _clips(
             key = clip_key(folders, file.stem)
             session = part_key(folder_key, part_of(file.name, n_parts), n_parts) if n_parts > 1 else folder_key
             path = f"clips/{file.path}"
-            problem = _unreadable(file, MOTION_SUFFIXES, limits.limits.largest_clip_mb, "a BVH file (.bvh)")
+            problem = _unreadable(file, MOTION_SUFFIXES, limits.limits.largest_clip_mb, _MOTION)
             digest, problem = ("", problem) if problem else _hashed(root, file, cache, now_ns)
             if not problem and taken.setdefault(key, path) != path:
                 problem = f"want its own key, got {key!r}, which {taken[key]} has; rename one of the two files"
             clips.append(Clip(key, session, path, "" if problem else digest, _facts_of(facts, file), problem))
     return clips
+
+
+def _is_motion(root: Path, file: File, notes: list[str]) -> bool:
+    """Whether a file is a source of motion, or stands there for one: tables of other kinds and documents are not."""
+    if file.name.endswith(POSES_ENDING):
+        return False
+    if file.suffix != ".csv":
+        return file.suffix not in DOCUMENT_SUFFIXES
+    if clips_csv.is_clips_csv(file.name):
+        return False
+    if suit.is_recording(root / file.path):
+        return True
+    notes.append(f"clips/{file.path}: its first line has no columns of a suit recording; left alone")
+    return False
 
 
 def _n_parts(n_files: int, in_use: int) -> int:

@@ -81,6 +81,13 @@ def vector(values: Float) -> pa.Array:
     )
 
 
+def quaternion(values: Float) -> pa.Array:
+    """Pack (F, 4) as one fixed-size list a row, float32."""
+    return pa.FixedSizeListArray.from_arrays(
+        pa.array(np.ascontiguousarray(values, np.float32).reshape(-1)), type=QUATERNION
+    )
+
+
 def to_array(column: pa.ChunkedArray) -> Float:
     """Unpack a column of vectors or of lists of vectors to (F, n) or (F, J, n) float64.
 

@@ -15,7 +15,7 @@ COLOUR = {
     "catalog": "#ece2f3",
     "dance": "#f9dede",
 }
-SOURCES = {"clips": "clips/**.bvh", "song": "songs/*", "request": "what was asked"}
+SOURCES = {"clips": "clips/**", "song": "songs/*", "request": "what was asked"}
 # Columns by how far an asset is from the files; rows so that lines seldom cross.
 PLACES = {
     "clips": (0, 1),
@@ -23,6 +23,7 @@ PLACES = {
     "clip": (1, 0),
     "pose": (1, 1),
     "skeleton": (1, 2),
+    "calibration": (1, 3),
     "canonical_pose": (2, 1.5),
     "motion_beat": (2, 0.3),
     "motion_graph_node": (3, 0.3),

@@ -132,6 +132,39 @@ def check(
 
 
 @app.command()
+def calibrate(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="A suit recording: .parquet or .csv.")],
+    bvh: Annotated[Path | None, typer.Option("--bvh", help="Also write the motion as BVH here.")] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option("--poses", help="Where to write joint centres, Parquet; else RECORDING.poses.parquet, here."),
+    ] = None,
+    method: Annotated[str | None, typer.Option("--method", help="gauss_newton or springs; else the setting.")] = None,
+    iterations: Annotated[int | None, typer.Option("--iterations", help="Steps of the method; 0: its usual.")] = None,
+    studio: Annotated[
+        Path | None, typer.Option("--studio", help="A studio whose odori.toml counts; needs none.", show_default=False)
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Calibrate a suit recording: bones, how sure they are, what to record again, and the motion. Needs no studio.
+
+    Examples: odori calibrate take.parquet · odori calibrate take.csv --bvh take.bvh
+    """
+    with _Trouble(as_json):
+        from pipelines import calibrate as calibrating
+
+        result = calibrating.calibrate(
+            recording,
+            studio=studio or (_folder(None) if "ODORI_STUDIO" in os.environ else None),
+            bvh_out=bvh,
+            poses_out=poses,
+            method=method,
+            iterations=iterations,
+        )
+        _finish(result, as_json)
+
+
+@app.command()
 def status(studio: StudioOption = None, as_json: JsonOption = False) -> None:
     """Say what is fresh, stale, failed or refused, and why.
 
@@ -187,9 +220,10 @@ class _Trouble:
         return None
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
+        if error is None or isinstance(error, typer.Exit):
+            return
         from assets.formats.errors import FormatError
-        from pipelines.lake import LakeError
-        from pipelines.resources import StudioError
+        from pipelines.files import LakeError, StudioError
 
         if isinstance(error, StudioError | LakeError | FormatError | LookupError | OSError):
             text = error.args[0] if isinstance(error, LookupError) and error.args else str(error)

@@ -4,7 +4,6 @@ import difflib
 import json
 import shutil
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,34 +20,16 @@ from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
+from pipelines.files import StudioError, write_beside
 from pipelines.freshness import Finding, Freshness
-from pipelines.lake import write_beside
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
+from pipelines.resources import StudioFolder
 from pipelines.web import existing
 from schemas.motion import CANONICAL_POSE
 from schemas.music import SONG
 from schemas.pins import parse_pin
 
-DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
 LONGEST_LIST = 40
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a command came to.
-
-    Parameters
-    ----------
-    status : exit status
-    facts : what ``--json`` prints
-    report : what a person reads on standard output
-    troubles : refused inputs and failures, one line each, for standard error
-    """
-
-    status: int
-    facts: dict[str, Any]
-    report: str = ""
-    troubles: Sequence[str] = field(default_factory=tuple)
 
 
 class _Session:
@@ -373,13 +354,13 @@ def status(root: Path) -> Outcome:
     """Say what is fresh, stale, failed or refused."""
     studio = existing(root)
     state = freshness(studio)
-    clips, songs = _clips(state, studio), _songs(state, studio)
+    (clips, doubts), songs = _clips_and_doubts(state, studio), _songs(state, studio)
     failures = building.last_failures(building.open_instance(studio)) if studio.dagster_home.is_dir() else {}
     assets = [_asset_facts(f, state, failures) for f in state.findings()]
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
     notes = list(state.sources.notes)
-    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes}
-    report = _status_report(studio, clips, songs, assets, refused, notes)
+    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes, "warnings": doubts}
+    report = _status_report(studio, clips, songs, assets, refused, notes, doubts)
     return Outcome(SOME_REFUSED if refused else DONE, facts, report)
 
 
@@ -401,6 +382,7 @@ def _status_report(
     assets: list[dict[str, Any]],
     refused: list[dict[str, Any]],
     notes: list[str],
+    doubts: list[dict[str, str]],
 ) -> str:
     lines = [f"studio {studio.root}"]
     for name, files in (("clips", clips), ("songs", songs)):
@@ -413,26 +395,38 @@ def _status_report(
     lines += [f"    {a['state']}: {a['asset']}[{a['partition']}]: {a['why']}" for a in unfresh[:LONGEST_LIST]]
     lines += _more(unfresh)
     lines += [f"  {line}" for line in _refusals(refused)]
+    doubtful = [f"  warning: {doubt['path']}: {doubt['warning']}" for doubt in doubts]
+    lines += doubtful[:LONGEST_LIST] + _more(doubtful)
     lines += [f"  note: {note}" for note in notes]
     return "\n".join(lines)
 
 
 def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
     """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
+    return _clips_and_doubts(state, studio)[0]
+
+
+def _clips_and_doubts(state: Freshness, studio: StudioFolder) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+    """List the motion files, and what is doubtful about those that were read."""
     stored = {}
     for session in studio.lake.keys("clip"):
+        if studio.lake.stamp("clip", session) is None:  # of an older version: as if it were not there
+            continue
         for row in studio.lake.table("clip", session).to_pylist():
             stored[row["path"]] = row
     unplaced = {session: _unplaced(state, session) for session in studio.lake.keys("canonical_pose")}
-    found = []
+    found: list[dict[str, Any]] = []
+    doubts: list[dict[str, str]] = []
     for clip in state.sources.clips:
         path = clip.path.encode("utf-8", "backslashreplace").decode()
         row = stored.get(path)
         seen = _seen(row, clip.sha256, clip.problem)
         if seen["state"] == "read" and clip.key in unplaced.get(clip.session, ()):
             seen = {"state": "refused", "reason": "its motion could not be brought to the canonical skeleton"}
+        warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
         found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
-    return found
+        doubts += [{"path": path, "warning": sentence} for sentence in warnings]
+    return found, doubts
 
 
 def _unplaced(state: Freshness, session: str) -> set[str]:

@@ -5,6 +5,7 @@ from typing import Any
 import dagster as dg
 
 from pipelines import jobs, schedules, sensors
+from pipelines.calibrate import PoseSolvers
 from pipelines.collection import ASSETS, freshness
 from pipelines.io_managers import EarlierTables, LakeIOManager, StageIOManager
 from pipelines.resources import NoProgress, StudioFolder, matcher, pair_distance, studio_from_environment
@@ -29,6 +30,9 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         ),
         "matcher": dg.ResourceDefinition(
             lambda context: matcher(context.resources.studio.settings()), required_resource_keys={"studio"}
+        ),
+        "solvers": dg.ResourceDefinition(
+            lambda context: PoseSolvers(context.resources.studio.settings().opencl), required_resource_keys={"studio"}
         ),
         "lake": dg.IOManagerDefinition(
             lambda context: LakeIOManager(context.resources.studio.lake, freshness(context.resources.studio)),

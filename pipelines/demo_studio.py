@@ -1,4 +1,4 @@
-"""A made-up studio on disk: two procedural dancers on two rigs, and a drum-machine song as WAV and MIDI."""
+"""A made-up studio on disk: two procedural dancers on two rigs, a third in a suit, and a song as WAV and MIDI."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -6,18 +6,23 @@ from typing import IO
 
 import numpy as np
 
-from assets.formats import audio, bvh, midi
+from assets.formats import audio, bvh, midi, suit
 from assets.formats.audio import Audio
+from kernels.calibration.records import Recording
 from kernels.synthetic import rigs
 from kernels.synthetic.dancer import MOVES, Take, take
+from kernels.synthetic.medley import medley, wear
 from kernels.synthetic.music import drum_machine_song
-from pipelines.lake import write_beside
-from pipelines.resources import StudioError
+from kernels.synthetic.suit import Disturbance, make_body, record
+from pipelines.files import StudioError, write_beside
 
 SONG = "drum_machine"
 TEMPO_BPM = 116.0
 _MARK = ".made-by-odori-demo"
 _SETTINGS = "# A made-up studio. Every key has a default; see 'docs/settings.md'.\n\n[dance]\nframe_rate_hz = 30\n"
+# A third dancer wears a suit and dances without a break.
+_SUIT, _SUIT_SEED = "tsubaki", 11
+_MEDLEY = ("step", "twist", "kick", "wave", "rock", "spin")
 # Beat intervals of the takes, and where each dancer faces: near the song's own beat, and one far from it.
 _TAKES = ((0.50, 0.0, 1.0), (0.54, 0.8, 0.8), (0.62, -1.2, 1.1))
 
@@ -65,9 +70,22 @@ def _files() -> Iterator[tuple[str, bytes]]:
             )
             rows.append(f"{name}.bvh,{made.label},procedural,{dancer},CC0-1.0")
         yield f"clips/{dancer}/clips.csv", ("\n".join(rows) + "\n").encode()
+    yield f"clips/{_SUIT}/medley.parquet", suit.format_parquet(suit_recording())
+    yield (
+        f"clips/{_SUIT}/clips.csv",
+        f"file,label,style,subject,licence\nmedley.parquet,medley,procedural,{_SUIT},CC0-1.0\n".encode(),
+    )
     song = drum_machine_song(tempo_bpm=TEMPO_BPM, n_bars=16, seed=7)
     yield f"songs/{SONG}.wav", audio.format_wav(Audio(song.render(), 44100))
     yield f"songs/{SONG}.mid", midi.format(song.notes, tempo=song.tempo)
+
+
+def suit_recording() -> Recording:
+    """Record the dancer in a suit: 28 s at 120 Hz with noise, soft tissue, outliers and drop-outs."""
+    body = make_body(_SUIT_SEED)
+    motion = wear(medley(_MEDLEY, interval_s=60 / TEMPO_BPM, frame_rate_hz=120.0, seed=_SUIT_SEED).clip, body)
+    noise = Disturbance(position_m=0.0015, rotation_rad=0.012, wobble_m=0.003, outlier_ratio=0.005, dropped_ratio=0.005)
+    return record(body, motion, seed=_SUIT_SEED, disturbance=noise).recording
 
 
 def _takes(rate_hz: float) -> Iterator[tuple[str, Take]]:

@@ -18,8 +18,9 @@ from assets.declare import METHODS_KEY, SETTINGS_KEY, SOURCES_KEY
 from assets.lineage import Stamp, version_of
 from assets.partitions import ALTERNATIVES, METHODS, base_method
 from assets.sources import Sources
+from pipelines.files import StudioError
 from pipelines.lake import Lake
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.resources import StudioFolder
 
 STAGE_IO_MANAGER = "stage"
 Kind = Literal["session", "song", "dance", "whole"]

@@ -16,8 +16,9 @@ from assets.dance import Stage
 from assets.formats import audio, tree, usd, usd_package
 from assets.lineage import Part, Parts, Stamp, content_version
 from assets.partitions import dagster_key, lake_key
+from pipelines.files import LakeError, why, write_beside
 from pipelines.freshness import Freshness
-from pipelines.lake import Lake, LakeError, why, write_beside
+from pipelines.lake import Lake
 from pipelines.resources import StudioFolder
 from schemas.catalog import TABLES
 from schemas.choreography import USD_ANIMATION

@@ -4,9 +4,8 @@ The only place that writes Parquet. A file is written beside and renamed, so a k
 one. Files of one table and content are byte-equal.
 """
 
-import errno
-from collections.abc import Callable, Iterable, Mapping
-from typing import IO, Any
+from collections.abc import Iterable
+from typing import IO
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -16,14 +15,11 @@ from upath import UPath
 from assets import tables
 from assets.formats import beside
 from assets.lineage import Stamp
+from pipelines.files import LakeError, write_beside
 from schemas.catalog import TABLES
 
 STAMP_KEY = b"odori"
 WHOLE = "all"
-
-
-class LakeError(Exception):
-    """The lake cannot be read or written; the message says which file, why, and what to do."""
 
 
 class Lake:
@@ -112,32 +108,3 @@ def _write_parquet(table: pa.Table, file: IO[bytes]) -> None:
 
 
 LONGEST_ROW_GROUPS = 4096
-
-_WHY: Mapping[int, str] = {
-    errno.ENOSPC: "the disk is full; free some space and run it again",
-    errno.EDQUOT: "the disk quota is used up; free some space and run it again",
-    errno.EFBIG: "the disk does not take a file this large; free some space and run it again",
-    errno.EROFS: "the disk is read-only; name a studio that can be written to",
-    errno.EACCES: "writing is not allowed there; mend the folder's permissions",
-    errno.EPERM: "writing is not allowed there; mend the folder's permissions",
-}
-
-
-def why(error: OSError) -> str:
-    """Say what a refused write means and what to do about it."""
-    return _WHY.get(error.errno or 0, f"{error.strerror or error}; see to the disk and run it again")
-
-
-def write_beside(path: Any, write: Callable[[IO[bytes]], object]) -> None:  # noqa: ANN401 - pathlib or universal path
-    """Write a file beside its place and rename it, so that there is never half of one.
-
-    Raises
-    ------
-    LakeError
-        If the disk refuses; the old file, if any, stays.
-    """
-    try:
-        with beside.written_beside(path) as partial, partial.open("wb") as file:
-            write(file)
-    except OSError as error:
-        raise LakeError(f"{path}: cannot be written: {why(error)}") from error

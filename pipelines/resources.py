@@ -17,12 +17,9 @@ from assets.formats.tree import HashCache
 from assets.matching import SegmentMatcher
 from assets.sources import Request, Song, Sources
 from kernels.graph.distance import PairDistance
-from pipelines.lake import Lake, write_beside
+from pipelines.files import write_beside
+from pipelines.lake import Lake
 from schemas.settings import Brief, OpenClSettings, Settings
-
-
-class StudioError(Exception):
-    """The studio folder cannot be used; the message says which, why, and what to do."""
 
 
 class StudioFolder:

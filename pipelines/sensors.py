@@ -7,9 +7,10 @@ import dagster as dg
 from assets.sources import fingerprint
 from pipelines import build
 from pipelines.collection import freshness
+from pipelines.files import StudioError
 from pipelines.freshness import Freshness
 from pipelines.jobs import JOBS
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.resources import StudioFolder
 
 RUN_KEY_TAG = "dagster/run_key"
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import FrameType
 
 from pipelines.build import end_dead_runs, open_instance
-from pipelines.lake import why
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.files import StudioError, why
+from pipelines.resources import StudioFolder
 
 
 def serve(root: Path, *, host: str, port: int) -> int:

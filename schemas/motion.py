@@ -9,7 +9,7 @@ from schemas.table import Column, Table
 
 CLIP = Table(
     name="clip",
-    version=1,
+    version=2,
     meaning="One file of motion under clips/.",
     key=("clip_id", "path"),
     columns=(
@@ -31,6 +31,8 @@ CLIP = Table(
         Column("up_axis", pa.string(), "Axis that points up in the file, inferred; empty when refused."),
         Column("root_offset_rule", pa.string(), "Whether root channels replace the root's OFFSET or add to it."),
         Column("naming_family", pa.string(), "Which table of joint names fitted, or 'topology'."),
+        Column("source_format", pa.string(), "What kind of file it is.", values=("bvh", "suit", "")),
+        Column("warnings", pa.list_(pa.string()), "What is doubtful about a clip that was read, one sentence each."),
     ),
 )
 

@@ -32,6 +32,26 @@ class Limits(_Checked):
 
 
 @dataclass(frozen=True)
+class CalibrationSettings(_Checked):
+    """How a suit recording becomes a skeleton and its poses."""
+
+    method: str = key(
+        "gauss_newton",
+        "'gauss_newton' (joints closed, two steps) or 'springs' (the document's relaxation, for comparison).",
+        values=("gauss_newton", "springs"),
+    )
+    iterations: int = key(0, "Steps of the method; 0: its usual, 2 of Gauss-Newton, 30 of springs.", least=0, most=1000)
+    low_pass_hz: float = key(
+        12.0, "Cutoff of the low-pass on sensors, which runs forwards and back.", least=1, most=1000
+    )
+    unit: str = key(
+        "auto",
+        "Lengths of recordings that do not say theirs: 'm', 'cm', 'mm', 'in', or 'auto'.",
+        values=("auto", "m", "cm", "mm", "in"),
+    )
+
+
+@dataclass(frozen=True)
 class MotionBeatSettings(_Checked):
     """How the beats of a clip are found (JP5778523B2)."""
 
@@ -152,6 +172,11 @@ class Settings:
     joints: dict[str, str] = field(
         default_factory=dict,
         metadata={"meaning": "Names of a rig's joints to canonical joints, where odori cannot tell."},
+    )
+    calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
+    sensors: dict[str, str] = field(
+        default_factory=dict,
+        metadata={"meaning": "Names of a recording's sensors to the suit's, where odori cannot tell."},
     )
     motion_beat: MotionBeatSettings = field(default_factory=MotionBeatSettings)
     music_beat: MusicBeatSettings = field(default_factory=MusicBeatSettings)

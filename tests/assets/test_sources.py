@@ -43,7 +43,7 @@ def test_empty_studio_has_nothing(tmp_path):
 
 def test_documents_are_no_sources_and_strangers_are_refused(studio):
     found = look(studio({"clips/LICENSE.txt": b"", "clips/x.fbx": b"x", "songs/x.zip": b"x", "songs/readme.md": b""}))
-    assert [c.problem[:30] for c in found.clips] == ["want a BVH file (.bvh), got '."]
+    assert [c.problem[:32] for c in found.clips] == ["want a BVH file (.bvh) or a suit"]
     assert [s.problem[:10] for s in found.songs] == ["want audio"]
 
 
@@ -157,3 +157,40 @@ def test_name_that_is_no_text_is_listed(studio, tmp_path):
 def test_brief_beside_a_song(studio):
     found = look(studio({"songs/x.wav": b"1", "songs/x.brief.toml": b"", "songs/y.wav": b"2"}))
     assert [s.brief for s in found.songs] == ["songs/x.brief.toml", ""]
+
+
+SUIT = b"frame,time_s,sensor,px_m,py_m,pz_m,qw,qx,qy,qz,is_valid\n"
+
+
+def test_suit_recordings_are_clips_and_other_tables_are_not(studio):
+    found = look(
+        studio(
+            {
+                "clips/s/take.csv": SUIT,
+                "clips/s/Take Two.parquet": b"PAR1",
+                "clips/s/walk.bvh": b"x",
+                "clips/s/clips.csv": b"file,label\ntake.csv,rom\n",
+                "clips/s/labels_more.csv": b"file,label\n",
+                "clips/s/budget.csv": b"item,price\n",
+                "clips/s/take.poses.parquet": b"PAR1",
+            }
+        )
+    )
+    assert [(c.key, c.kind, c.problem) for c in found.clips] == [
+        ("s-take_two", "suit", ""),
+        ("s-take", "suit", ""),
+        ("s-walk", "bvh", ""),
+    ]
+    assert all(c.session == "s" and c.sha256 for c in found.clips)
+    assert {c.path: c.facts.label for c in found.clips}["clips/s/take.csv"] == "rom"
+    assert found.notes == ("clips/s/budget.csv: its first line has no columns of a suit recording; left alone",)
+
+
+def test_a_table_that_says_what_clips_are_is_never_one_itself(studio):
+    """Whatever its columns."""
+    assert look(studio({"clips/s/clips.csv": SUIT, "clips/s/labels.csv": SUIT})).clips == ()
+
+
+def test_one_stem_as_bvh_and_recording_goes_to_the_first(studio):
+    found = look(studio({"clips/s/a.bvh": b"x", "clips/s/a.csv": SUIT}))
+    assert [bool(c.problem) for c in found.clips] == [False, True]

@@ -184,3 +184,8 @@ def test_partners_are_found_again_in_blends_wider_than_a_step():
     again = tables.to_dance(pose, line, steps)
     assert set(dance.lineage.blend_step_index) == {-1, 1, 2, 4, 5}
     np.testing.assert_array_equal(again.lineage.blend_step_index, dance.lineage.blend_step_index)
+
+
+def test_quaternions_one_a_row():
+    values = np.arange(12.0).reshape(3, 4)
+    np.testing.assert_array_equal(tables.to_array(tables.quaternion(values)), values)

@@ -13,7 +13,8 @@ from assets.formats import audio
 from assets.formats.audio import Audio
 from kernels.synthetic.dancer import take
 from pipelines import commands
-from pipelines.resources import NoProgress, StudioError
+from pipelines.files import StudioError
+from pipelines.resources import NoProgress
 
 
 def reasons(outcome):

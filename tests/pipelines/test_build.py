@@ -15,7 +15,8 @@ import pytest
 from kernels.opencl.device import pick_device
 from pipelines import build as building
 from pipelines.collection import freshness
-from pipelines.resources import StudioError, StudioFolder
+from pipelines.files import StudioError
+from pipelines.resources import StudioFolder
 
 
 def ran(outcome):

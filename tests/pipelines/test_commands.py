@@ -15,7 +15,8 @@ import pytest
 from assets.formats import usd_check, usd_package, usd_read
 from assets.tables import to_array
 from pipelines import commands
-from pipelines.resources import NoProgress, StudioError
+from pipelines.files import StudioError
+from pipelines.resources import NoProgress
 from schemas.catalog import TABLES
 
 

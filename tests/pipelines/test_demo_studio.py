@@ -5,7 +5,8 @@ import pytest
 
 from assets.formats import bvh, midi
 from pipelines import commands, demo_studio
-from pipelines.resources import NoProgress, StudioError
+from pipelines.files import StudioError
+from pipelines.resources import NoProgress
 
 
 def files(root):

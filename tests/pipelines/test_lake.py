@@ -10,7 +10,8 @@ from assets import tables
 from assets.lineage import ClipStamp, Stamp
 from kernels.motion.beats import motion_beats
 from kernels.synthetic.dancer import place, take
-from pipelines.lake import Lake, LakeError, why, write_beside
+from pipelines.files import LakeError, why, write_beside
+from pipelines.lake import Lake
 from schemas.motion import MOTION_BEAT
 
 STAMP = Stamp("1", "s", {"pose": "v"}, "c", {"s-step": ClipStamp("a", "b")})

@@ -7,7 +7,8 @@ import polars as pl
 import pytest
 
 from pipelines import commands
-from pipelines.resources import NoProgress, StudioError
+from pipelines.files import StudioError
+from pipelines.resources import NoProgress
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from pipelines import build as building
 from pipelines import commands
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.lake import LakeError
-from pipelines.resources import NoProgress, StudioError, StudioFolder
+from pipelines.files import LakeError, StudioError
+from pipelines.resources import NoProgress, StudioFolder
 
 
 def states(root):

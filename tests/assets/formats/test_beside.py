@@ -11,7 +11,7 @@ from assets.formats import audio, usd
 from assets.formats.audio import Audio
 from assets.formats.beside import MARK, sweep, written_beside
 from assets.formats.tree import File, HashCache
-from pipelines.lake import write_beside
+from pipelines.files import write_beside
 
 
 def test_the_file_is_whole_and_alone(tmp_path):
