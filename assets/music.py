@@ -92,7 +92,7 @@ def listen(song: Song, studio: Studio, settings: Settings) -> Heard:
         duration_s = decoded.duration_s
         analysis = track_beats(sound, rate_hz, tracker=settings.music_beat.tracker)
     time_s, level_db = loudness_db(sound, rate_hz, frame_rate_hz=LOUDNESS_RATE_HZ)
-    analysis = _as_briefed(analysis, studio.brief(song).beats, studio, song)
+    analysis = _within(_as_briefed(analysis, studio.brief(song).beats, studio, song), duration_s)
     return Heard(duration_s, 0 if song.kind == "midi" else rate_hz, n_channels, analysis, time_s, level_db)
 
 
@@ -102,6 +102,10 @@ LOUDNESS_RATE_HZ = 20.0
 
 def _as_briefed(analysis: BeatAnalysis, brief: BeatsBrief, studio: Studio, song: Song) -> BeatAnalysis:
     if brief.file:
+        if "/" in brief.file or "\\" in brief.file:
+            raise FormatError(
+                song.brief, 0, f"beats.file: want the name of a file beside the brief, got {brief.file!r}; put it there"
+            )
         grid = beats_file.read(studio.file(song.brief).parent / brief.file)
         analysis = BeatAnalysis(grid, _level_of(grid))
     grid = change_level(analysis.grid, brief.octave) if brief.octave != 1 else analysis.grid
@@ -112,6 +116,16 @@ def _as_briefed(analysis: BeatAnalysis, brief: BeatsBrief, studio: Studio, song:
         for c in analysis.tempo_candidates
     )
     return BeatAnalysis(grid, candidates)
+
+
+def _within(analysis: BeatAnalysis, duration_s: float) -> BeatAnalysis:
+    """Keep the beats that are in the song: a file or a nudge may have put some outside."""
+    grid = analysis.grid
+    inside = (grid.time_s >= 0) & (grid.time_s <= duration_s + 1e-6)
+    if inside.all():
+        return analysis
+    kept = (getattr(grid, name)[inside] for name in ("time_s", "bar_number", "beat_in_bar_number", "confidence"))
+    return replace(analysis, grid=BeatGrid(*kept))
 
 
 def _level_of(grid: BeatGrid) -> tuple[TempoCandidate, ...]:
@@ -133,7 +147,10 @@ def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
                     heard = listen(song, studio, studio.settings())
                 reason = _undanceable(heard)
             except (FormatError, ValueError) as error:
-                reason = getattr(error, "what", "") or str(error)
+                is_own = (
+                    isinstance(error, FormatError) and error.path.rsplit("/", 1)[-1] == song.path.rsplit("/", 1)[-1]
+                )
+                reason = error.what if isinstance(error, FormatError) and is_own else str(error)
             except OSError as error:  # may be readable next time: never taken for fresh
                 reason = f"cannot be read: {error.strerror or error}; see to the file"
                 version = version_of(version, "unread")

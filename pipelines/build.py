@@ -252,6 +252,8 @@ def bring_up_to_date(
                 report.troubles += failed
                 given_up |= unmade(batch, state) if failed else set()
         state.forget()
+        # What was made and is not fresh was edited meanwhile: the next build takes it up, this one goes on.
+        given_up |= {(a, k) for b in batches for a in b.assets for k in b.keys if state.state(a, k).state == "stale"}
 
 
 def unmade(batch: Batch, state: Freshness) -> set[tuple[str, str]]:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
+import click
 import typer
 from rich.console import Console
 
@@ -197,7 +198,7 @@ def _folder(studio: Path | None) -> Path:
 
 
 def _say(text: str, as_json: bool) -> None:
-    (TROUBLE if as_json else Console(highlight=False, soft_wrap=True, markup=False)).print(text)
+    (TROUBLE if as_json else Console(highlight=False, soft_wrap=True, markup=False, emoji=False)).print(text)
 
 
 def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - a commands.Outcome; typed where it is loaded
@@ -245,7 +246,16 @@ def main() -> None:
     """Run the command; ``--json`` may stand anywhere, also last."""
     for library in ("OPENBLAS", "OMP", "MKL"):  # more threads change last bits: same inputs, same bytes
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
-    app()
+    try:
+        status = app(standalone_mode=False)
+    except click.ClickException as error:  # a usage error: machines get their one object
+        error.show()
+        if "--json" in sys.argv:
+            sys.stdout.write(json.dumps({"error": error.format_message()}) + "\n")
+        status = error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        status = 130
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -108,7 +108,7 @@ class LakeIOManager(dg.IOManager):
         if context.dagster_type.typing_type is pa.Table:
             return StoredTable(self._lake, asset, keys).read(keys[0])
         # Of all partitions those that there are: one that could not be made stops no other.
-        return StoredTable(self._lake, asset, [key for key in keys if self._lake.stamp(asset, key) is not None])
+        return StoredTable(self._lake, asset, [key for key in sorted(keys) if self._lake.stamp(asset, key) is not None])
 
 
 def _parts(obj: pa.Table | Part | Parts, keys: Sequence[str]) -> Iterable[Part]:

@@ -56,7 +56,7 @@ class MotionBeatSettings(_Checked):
     """How the beats of a clip are found (JP5778523B2)."""
 
     method: str = key("fft", "'fft', as the document has it, or 'autocorrelation'.", values=("fft", "autocorrelation"))
-    component: int = key(1, "Principal component that carries the beat, from 1.", least=1)
+    component: int = key(1, "Principal component that carries the beat, from 1.", least=1, most=22)
     frame: str = key(
         "body", "'body': joints seen from where the dancer faces; 'world': as the document.", values=("body", "world")
     )
@@ -153,7 +153,9 @@ class DanceSettings(_Checked):
     """What a dance looks like on disk."""
 
     frame_rate_hz: float = key(30.0, "Frames a second of the stage.", least=1, most=240)
-    blend_s: float = key(0.4, "Song time over which two clips are blended, centred on the beat of the seam.", least=0)
+    blend_s: float = key(
+        0.4, "Song time over which two clips are blended, centred on the beat of the seam.", least=0, most=2
+    )
     lock_feet: bool = key(True, "Keep feet where they stand: root and legs give way to contacts of the clips.")
 
 
@@ -196,8 +198,8 @@ class BeatsBrief(_Checked):
 
     file: str = key("", "A beats file beside the brief: one beat a line, seconds, optional beat in bar.")
     octave: float = key(1.0, "Factor on the tempo found: 2 counts twice as fast, 0.5 half.", least=0.125, most=8)
-    nudge_beats: float = key(0.0, "Shift of all beats in beats; 0.5 moves them to the off-beats.")
-    nudge_ms: float = key(0.0, "Shift of all beats in milliseconds.")
+    nudge_beats: float = key(0.0, "Shift of all beats in beats; 0.5 moves them to the off-beats.", least=-16, most=16)
+    nudge_ms: float = key(0.0, "Shift of all beats in milliseconds.", least=-10000, most=10000)
 
 
 @dataclass(frozen=True)
