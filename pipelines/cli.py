@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
-import click
 import typer
 from rich.console import Console
 
@@ -24,7 +23,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
-TROUBLE = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
+TROUBLE = Console(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
+_answered: list[bool] = []
+"""Whether standard output has had its one object."""
 
 StudioOption = Annotated[
     Path | None,
@@ -205,6 +206,7 @@ def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - a commands.Ou
     for line in result.troubles:
         TROUBLE.print(line)
     if as_json:
+        _answered.append(True)
         sys.stdout.write(json.dumps(result.facts, ensure_ascii=False, sort_keys=True) + "\n")
     elif result.report:
         _say(result.report, as_json)
@@ -230,6 +232,7 @@ class _Trouble:
             text = error.args[0] if isinstance(error, LookupError) and error.args else str(error)
             TROUBLE.print(f"odori: {text}")
             if self._as_json:
+                _answered.append(True)
                 sys.stdout.write(json.dumps({"error": str(text)}) + "\n")
             raise typer.Exit(NOTHING_DONE) from error
 
@@ -247,15 +250,11 @@ def main() -> None:
     for library in ("OPENBLAS", "OMP", "MKL"):  # more threads change last bits: same inputs, same bytes
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     try:
-        status = app(standalone_mode=False)
-    except click.ClickException as error:  # a usage error: machines get their one object
-        error.show()
-        if "--json" in sys.argv:
-            sys.stdout.write(json.dumps({"error": error.format_message()}) + "\n")
-        status = error.exit_code
-    except (click.Abort, KeyboardInterrupt):
-        status = 130
-    sys.exit(status)
+        app()
+    except SystemExit as ended:
+        if ended.code == NOTHING_DONE and "--json" in sys.argv and not _answered:  # a usage error, said by the parser
+            sys.stdout.write(json.dumps({"error": "the command line is wrong; standard error says how"}) + "\n")
+        raise
 
 
 if __name__ == "__main__":

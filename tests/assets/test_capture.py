@@ -22,7 +22,9 @@ def test_the_largest_clip_is_the_settings_not_the_readers(tmp_path, monkeypatch,
     monkeypatch.setattr(bvh, "read", lambda path, **limits: asked.append(limits) or read(path, **limits))
     settings = Settings(limits=Limits(largest_clip_mb=largest_clip_mb))
     studio = SimpleNamespace(settings=lambda: settings, file=lambda path: tmp_path / path)
-    reader = _Reader(studio, SimpleNamespace(stamp=lambda *_: None, table=lambda *_: None), NoProgress(), "1")
+    reader = _Reader(
+        studio, SimpleNamespace(), SimpleNamespace(stamp=lambda *_: None, table=lambda *_: None), NoProgress(), "1"
+    )
     parts = reader.read("s", (Clip("s-step", "s", "step.bvh", "0", Facts()),))
     assert asked == [{"max_bytes": round(largest_clip_mb * 1e6)}]
     (row,) = parts["clip"].table.to_pylist()

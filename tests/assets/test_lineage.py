@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 
 from assets import lineage, tables
-from assets.lineage import ClipStamp, Stamp
+from assets.lineage import ClipStamp, Stamp, content_version
 from kernels.motion.beats import motion_beats
 from kernels.synthetic.dancer import place, take
 from schemas.motion import MOTION_BEAT
@@ -114,7 +114,6 @@ def test_content_does_not_depend_on_the_layout_in_memory(tmp_path):
     """Rows made now, rows read back, and rows sliced out of more are the same content."""
     import pyarrow.parquet as pq
 
-    import assets.tables as tables
     from kernels.skeleton.naming import map_joints
     from kernels.synthetic.dancer import take
 

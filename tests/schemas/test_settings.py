@@ -26,7 +26,7 @@ def test_every_key_has_a_meaning(record):
     ("kind", "wrong", "word"),
     [
         (MotionBeatSettings, {"method": "guess"}, "want one of fft, autocorrelation, got 'guess'"),
-        (MotionBeatSettings, {"component": 0}, "component: want at least 1, got 0"),
+        (MotionBeatSettings, {"component": 0}, "component: want 1 to 22, got 0"),
         (MotionGraphSettings, {"neighbours": -1}, "neighbours"),
         (DanceSettings, {"frame_rate_hz": 1000.0}, "want 1 to 240"),
         (DanceSettings, {"blend_s": float("nan")}, "blend_s: want a finite number, got nan"),
