@@ -10,6 +10,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+_LARGE_BYTES = 2**22
 _INDEX = ("match_index.cl",)
 _SEARCH = ("match_score.cl", "match_refine.cl")
 
@@ -98,6 +99,10 @@ class Program:
         """
         if n_bytes > self.device.max_mem_alloc_size:
             raise cl.MemoryError(f"buffer: want at most {self.device.max_mem_alloc_size} bytes, got {n_bytes}")
+        if self.is_cpu and n_bytes >= _LARGE_BYTES:
+            # as an array of the host: NumPy asks for large pages, of which a table touches 500 times fewer
+            own = cl.mem_flags.READ_WRITE | cl.mem_flags.USE_HOST_PTR
+            return cl.Buffer(self.context, own, hostbuf=np.zeros(n_bytes, np.uint8))
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size=max(n_bytes, 16))
 
     def read(self, buffer: cl.Buffer, shape: tuple[int, ...], dtype: type[Any]) -> NDArray[Any]:

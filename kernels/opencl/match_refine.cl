@@ -9,53 +9,134 @@
 // frames): first[level * (n_segments + 1) + segment], block, amount; steps of a level begin at level_step[level] and are
 // level_long[level] a scale. The first level's steps are folded, the frames' are the shift alone, with a weight.
 
-// the sums of 8 starts from f0 over a list, by a table's rows
+// The sums of 8 starts each of `n` groups over a list, by a table's rows: steps and amounts are read once for all of them.
+// from: where the groups begin, in a row.
+#define SUMS_OF(n) \
+static void JOIN(sums_of_, n)( \
+    __global const float *rows, const int *from, const size_t stride, __global const int2 *steps, \
+    __global const int *first, __global const int *block, __global const float2 *amount, float8 *out) \
+{ \
+    float8 sum[n]; \
+    __global const float *at[n]; \
+    _Pragma("unroll") \
+    for (int g = 0; g < n; ++g) { \
+        sum[g] = (float8)(0.0f); \
+        at[g] = rows + from[g]; \
+    } \
+    for (int j = first[0]; j < first[1]; j += 4) { \
+        const int2 k0 = steps[block[j]], k1 = steps[block[j + 1]], k2 = steps[block[j + 2]], k3 = steps[block[j + 3]]; \
+        const size_t o0 = k0.x * stride + k0.y, o1 = k1.x * stride + k1.y; \
+        const size_t o2 = k2.x * stride + k2.y, o3 = k3.x * stride + k3.y; \
+        const float2 a0 = amount[j], a1 = amount[j + 1], a2 = amount[j + 2], a3 = amount[j + 3]; \
+        _Pragma("unroll") \
+        for (int g = 0; g < n; ++g) { \
+            const float8 b0 = LOAD8(at[g] + o0), b1 = LOAD8(at[g] + o1), b2 = LOAD8(at[g] + o2), b3 = LOAD8(at[g] + o3); \
+            ADD_TERMS(sum[g], b0, b1, b2, b3, a0.x, a1.x, a2.x, a3.x, a0.y, a1.y, a2.y, a3.y); \
+        } \
+    } \
+    _Pragma("unroll") \
+    for (int g = 0; g < n; ++g) \
+        out[g] = sum[g]; \
+}
+SUMS_OF(1)
+SUMS_OF(2)
+SUMS_OF(4)
+
+// the same over the frames, interpolated here
+#define EXACT_OF(n) \
+static void JOIN(exact_of_, n)( \
+    __global const float *in, const int *from, __global const int2 *steps, __global const float *weights, \
+    __global const int *first, __global const int *block, __global const float2 *amount, float8 *out) \
+{ \
+    float8 sum[n]; \
+    __global const float *at[n]; \
+    _Pragma("unroll") \
+    for (int g = 0; g < n; ++g) { \
+        sum[g] = (float8)(0.0f); \
+        at[g] = in + from[g]; \
+    } \
+    for (int j = first[0]; j < first[1]; j += 4) { \
+        const int f0 = block[j], f1 = block[j + 1], f2 = block[j + 2], f3 = block[j + 3]; \
+        const int o0 = steps[f0].y, o1 = steps[f1].y, o2 = steps[f2].y, o3 = steps[f3].y; \
+        const float w0 = weights[f0], w1 = weights[f1], w2 = weights[f2], w3 = weights[f3]; \
+        const float v0 = 1.0f - w0, v1 = 1.0f - w1, v2 = 1.0f - w2, v3 = 1.0f - w3; \
+        const float2 a0 = amount[j], a1 = amount[j + 1], a2 = amount[j + 2], a3 = amount[j + 3]; \
+        _Pragma("unroll") \
+        for (int g = 0; g < n; ++g) { \
+            const float8 b0 = v0 * LOAD8(at[g] + o0) + w0 * LOAD8(at[g] + o0 + 1); \
+            const float8 b1 = v1 * LOAD8(at[g] + o1) + w1 * LOAD8(at[g] + o1 + 1); \
+            const float8 b2 = v2 * LOAD8(at[g] + o2) + w2 * LOAD8(at[g] + o2 + 1); \
+            const float8 b3 = v3 * LOAD8(at[g] + o3) + w3 * LOAD8(at[g] + o3 + 1); \
+            ADD_TERMS(sum[g], b0, b1, b2, b3, a0.x, a1.x, a2.x, a3.x, a0.y, a1.y, a2.y, a3.y); \
+        } \
+    } \
+    _Pragma("unroll") \
+    for (int g = 0; g < n; ++g) \
+        out[g] = sum[g]; \
+}
+EXACT_OF(1)
+EXACT_OF(2)
+EXACT_OF(4)
+
+// for one group
 static float8 sum_of_8(
     __global const float *rows, const size_t stride, __global const int2 *steps,
     __global const int *first, __global const int *block, __global const float2 *amount)
 {
-    float8 sum = (float8)(0.0f);
-    for (int j = first[0]; j < first[1]; j += 4) {
-        const int2 k0 = steps[block[j]], k1 = steps[block[j + 1]], k2 = steps[block[j + 2]], k3 = steps[block[j + 3]];
-        const float8 b0 = LOAD8(rows + k0.x * stride + k0.y), b1 = LOAD8(rows + k1.x * stride + k1.y);
-        const float8 b2 = LOAD8(rows + k2.x * stride + k2.y), b3 = LOAD8(rows + k3.x * stride + k3.y);
-        const float2 a0 = amount[j], a1 = amount[j + 1], a2 = amount[j + 2], a3 = amount[j + 3];
-        ADD_TERMS(sum, b0, b1, b2, b3, a0.x, a1.x, a2.x, a3.x, a0.y, a1.y, a2.y, a3.y);
-    }
+    const int from = 0;
+    float8 sum;
+    sums_of_1(rows, &from, stride, steps, first, block, amount, &sum);
     return sum;
 }
 
-// the sums of 8 starts over the frames, interpolated here
 static float8 exact_of_8(
     __global const float *in, __global const int2 *steps, __global const float *weights,
     __global const int *first, __global const int *block, __global const float2 *amount)
 {
-    float8 sum = (float8)(0.0f);
-    for (int j = first[0]; j < first[1]; j += 4) {
-        float8 b[4];
-        #pragma unroll
-        for (int i = 0; i < 4; ++i) {
-            const int f = block[j + i];
-            __global const float *at = in + steps[f].y;
-            const float w = weights[f];
-            b[i] = (1.0f - w) * LOAD8(at) + w * LOAD8(at + 1);
-        }
-        const float2 a0 = amount[j], a1 = amount[j + 1], a2 = amount[j + 2], a3 = amount[j + 3];
-        ADD_TERMS(sum, b[0], b[1], b[2], b[3], a0.x, a1.x, a2.x, a3.x, a0.y, a1.y, a2.y, a3.y);
-    }
+    const int from = 0;
+    float8 sum;
+    exact_of_1(in, &from, steps, weights, first, block, amount, &sum);
     return sum;
 }
 
 // the smallest of the first n of 8
 static float least_of_8(const float8 sum, const int n)
 {
-    union { float8 v; float lane[8]; } x;
-    x.v = sum;
-    float least = x.lane[0];
-    for (int i = 1; i < 8; ++i)
-        least = i < n && x.lane[i] < least ? x.lane[i] : least;
-    return least;
+    const int8 lane = (int8)(0, 1, 2, 3, 4, 5, 6, 7);
+    const float8 some = lane < (int8)(n) ? sum : (float8)(FAR);
+    const float4 four = some.lo < some.hi ? some.lo : some.hi;
+    const float2 two = four.lo < four.hi ? four.lo : four.hi;
+    return two.x < two.y ? two.x : two.y;
 }
+
+// the bounds of `n` times LANES groups from a folded table, one segment's list
+#define BOUNDS_OF(n) \
+static void JOIN(bounds_of_, n)( \
+    __global const float *rows, const size_t columns, __global const int2 *steps, \
+    __global const int *first, __global const int *block, __global const float2 *amount, VEC *out) \
+{ \
+    VEC sum[n]; \
+    _Pragma("unroll") \
+    for (int g = 0; g < n; ++g) \
+        sum[g] = (VEC)(0.0f); \
+    for (int j = first[0]; j < first[1]; j += 4) { \
+        const int2 k0 = steps[block[j]], k1 = steps[block[j + 1]], k2 = steps[block[j + 2]], k3 = steps[block[j + 3]]; \
+        __global const float *r0 = rows + (k0.x * columns + k0.y), *r1 = rows + (k1.x * columns + k1.y); \
+        __global const float *r2 = rows + (k2.x * columns + k2.y), *r3 = rows + (k3.x * columns + k3.y); \
+        const float2 a0 = amount[j], a1 = amount[j + 1], a2 = amount[j + 2], a3 = amount[j + 3]; \
+        _Pragma("unroll") \
+        for (int g = 0; g < n; ++g) { \
+            const VEC b0 = LOAD(r0 + g * LANES), b1 = LOAD(r1 + g * LANES); \
+            const VEC b2 = LOAD(r2 + g * LANES), b3 = LOAD(r3 + g * LANES); \
+            ADD_TERMS(sum[g], b0, b1, b2, b3, a0.x, a1.x, a2.x, a3.x, a0.y, a1.y, a2.y, a3.y); \
+        } \
+    } \
+    _Pragma("unroll") \
+    for (int g = 0; g < n; ++g) \
+        out[g] = sum[g]; \
+}
+BOUNDS_OF(1)
+BOUNDS_OF(2)
 
 #define CLIPS \
     __global const int *restrict clip_first, __global const int *restrict clip_stride, \
@@ -94,6 +175,8 @@ __kernel void probe(
 
 // Depth first. least_score[pair]: what a start must reach. With most = 0, the best score found (-1: none) goes to
 // found[pair] and prunes on; else every start with score + margin >= least_score is written, `most` at most, and counted.
+// Groups that pass the first bound wait in a list, so that what follows takes up to four of them together.
+#define WAITING 64
 __kernel void refine(
     const int n_pairs, const int most, CLIPS, SEGMENTS, STEPS, TABLES,
     __global const int2 *restrict pair, __global const float *restrict least_score,
@@ -104,62 +187,87 @@ __kernel void refine(
         return;
     const int segment = pair[id].x, clip = pair[id].y;
     const size_t base = clip_first[clip];
-    const int stride = clip_stride[clip];
+    const int stride = clip_stride[clip], columns = stride / fold;
     const float a_sum = music_sum[segment], slack = margin[segment];
     float wanted = least_score[id], best = -1.0f;
     for (int p = 0; p < n_scales; ++p) {
         const int n_starts = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]);
         const int n_groups = (n_starts + fold - 1) / fold;
-        for (int i = 0; i < n_groups; i += LANES) {
-            union { VEC v; float lane[LANES]; } bound;
-            bound.v = (VEC)(0.0f);
+        int from[WAITING];
+        int n = 0;
+        for (int i = 0; i < n_groups; i += 2 * LANES) {
+            union { VEC v[2]; float lane[2 * LANES]; } bound;
+            bound.v[0] = bound.v[1] = (VEC)(0.0f);
             if (n_bounds > 0) {
-                __global const int2 *steps = STEPS_OF(0, p);
                 __global const float *rows = folded + base * fold_rows + i;
-                const int columns = stride / fold;
-                VEC sum = (VEC)(0.0f);
-                for (int j = first[segment]; j < first[segment + 1]; j += 4) {
-                    const int2 k0 = steps[block[j]], k1 = steps[block[j + 1]];
-                    const int2 k2 = steps[block[j + 2]], k3 = steps[block[j + 3]];
-                    const VEC b0 = LOAD(rows + (size_t)k0.x * columns + k0.y);
-                    const VEC b1 = LOAD(rows + (size_t)k1.x * columns + k1.y);
-                    const VEC b2 = LOAD(rows + (size_t)k2.x * columns + k2.y);
-                    const VEC b3 = LOAD(rows + (size_t)k3.x * columns + k3.y);
-                    const float2 a0 = amount[j], a1 = amount[j + 1], a2 = amount[j + 2], a3 = amount[j + 3];
-                    ADD_TERMS(sum, b0, b1, b2, b3, a0.x, a1.x, a2.x, a3.x, a0.y, a1.y, a2.y, a3.y);
-                }
-                bound.v = sum;
+                if (n_groups - i > LANES)
+                    bounds_of_2(rows, columns, STEPS_OF(0, p), LIST_OF(0, segment), bound.v);
+                else
+                    bounds_of_1(rows, columns, STEPS_OF(0, p), LIST_OF(0, segment), bound.v);
             }
-            const int here = n_groups - i < LANES ? n_groups - i : LANES;
+            const int here = n_groups - i < 2 * LANES ? n_groups - i : 2 * LANES;
             for (int lane = 0; lane < here; ++lane) {
-                if (a_sum - bound.lane[lane] + slack < wanted)
-                    continue;
-                const int f0 = fold * (i + lane);
-                const int n = n_starts - f0 < fold ? n_starts - f0 : fold;
-                if (n_bounds > 1 && a_sum + slack - least_of_8(sum_of_8(table_1 + base * rows_1 + f0, stride,
-                        STEPS_OF(1, p), LIST_OF(1, segment)), n) < wanted)
-                    continue;
-                if (n_bounds > 2 && a_sum + slack - least_of_8(sum_of_8(table_2 + base * rows_2 + f0, stride,
-                        STEPS_OF(2, p), LIST_OF(2, segment)), n) < wanted)
-                    continue;
-                union { float8 v; float lane[8]; } exact;
-                exact.v = exact_of_8(frame + base + f0, STEPS_OF(n_bounds, p), weight + p * level_long[n_bounds],
-                    LIST_OF(n_bounds, segment));
-                for (int start = 0; start < n; ++start) {
-                    float score = a_sum - exact.lane[start];
-                    score = score > 0.0f ? score : 0.0f;
-                    if (most > 0) {
-                        if (score + slack >= wanted) {
-                            const int at = atomic_inc(count);
-                            if (at < most)
-                                emitted[at] = (int2)(id, (p << SCALE_BITS) + f0 + start);
-                        }
-                    } else {
-                        best = score > best ? score : best;
-                        wanted = score > wanted ? score : wanted;
+                from[n] = fold * (i + lane);
+                n += a_sum - bound.lane[lane] + slack >= wanted;
+            }
+            if (n + 2 * LANES < WAITING && i + 2 * LANES < n_groups)
+                continue;
+            float8 sum[4];
+            for (int level = 1; level < n_bounds; ++level) {
+                __global const float *rows = level == 1 ? table_1 + base * rows_1 : table_2 + base * rows_2;
+                int passed = 0;
+                for (int g = 0; g < n;) {
+                    const int left = n - g, taken = left > 2 ? 4 : left;
+                    if (left == 3)
+                        from[n] = from[g];
+                    if (taken == 4)
+                        sums_of_4(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
+                    else if (taken == 2)
+                        sums_of_2(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
+                    else
+                        sums_of_1(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
+                    for (int j = 0; j < taken && j < left; ++j) {
+                        const int f0 = from[g + j];
+                        from[passed] = f0;
+                        passed += a_sum + slack - least_of_8(sum[j], min(n_starts - f0, fold)) >= wanted;
+                    }
+                    g += taken;
+                }
+                n = passed;
+            }
+            for (int g = 0; g < n;) {
+                const int left = n - g, taken = left > 2 ? 4 : left;
+                __global const float *in = frame + base;
+                __global const float *weights = weight + p * level_long[n_bounds];
+                if (left == 3)
+                    from[n] = from[g];
+                if (taken == 4)
+                    exact_of_4(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
+                else if (taken == 2)
+                    exact_of_2(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
+                else
+                    exact_of_1(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
+                for (int j = 0; j < taken && j < left; ++j) {
+                    const int f0 = from[g + j], starts = min(n_starts - f0, fold);
+                    float top = a_sum - least_of_8(sum[j], starts);
+                    top = top > 0.0f ? top : 0.0f;
+                    if (most == 0) {
+                        best = top > best ? top : best;
+                        wanted = top > wanted ? top : wanted;
+                    } else if (top + slack >= wanted) {
+                        union { float8 v; float lane[8]; } exact;
+                        exact.v = sum[j];
+                        for (int start = 0; start < starts; ++start)
+                            if (a_sum - exact.lane[start] + slack >= wanted || slack >= wanted) {
+                                const int at = atomic_inc(count);
+                                if (at < most)
+                                    emitted[at] = (int2)(id, (p << SCALE_BITS) + f0 + start);
+                            }
                     }
                 }
+                g += taken;
             }
+            n = 0;
         }
     }
     if (most == 0)

@@ -12,7 +12,7 @@ from kernels.matching.blocks import Rows, parent, rows
 from kernels.matching.plan import Plan, built
 from kernels.opencl.match_program import Program
 
-_BATCH_BYTES = 2**22
+_BATCH_BYTES = 2**24
 
 
 class Tables:
@@ -101,11 +101,11 @@ class Tables:
                 self._sum(g, where, all_rows, weights[g], begin, end)
             for g, starts in fold:
                 table, origin = where[g]
-                widest_clip = int(self.stride[begin:end].max())
+                span = self._span(begin, end)
                 self.program.run(
                     "largest_of",
-                    (-(-widest_clip // 64), len(all_rows[g]), end - begin),
-                    *(begin, end - begin, len(all_rows[g]), starts, 0, origin),
+                    (-(-int(self.stride[begin:end].max()) // span), len(all_rows[g]), end - begin),
+                    *(begin, end - begin, len(all_rows[g]), starts, 0, origin, span),
                     *(self.clip_first, self.clip_stride, table, folded[g, starts]),
                     light=True,
                 )
@@ -132,21 +132,26 @@ class Tables:
     ) -> None:
         """Sum the rows of a few clips."""
         table, origin = where[g]
-        size = (-(-int(self.stride[begin:end].max()) // self.program.lanes), len(all_rows[g]), end - begin)
+        span = self._span(begin, end)
+        size = (-(-int(self.stride[begin:end].max()) // span), len(all_rows[g]), end - begin)
         common = (begin, end - begin, len(all_rows[g]))
         if parent(g) in all_rows:
             small, small_origin = where[parent(g)]
             self.program.run(
-                *("sum_blocks", size, *common, len(all_rows[parent(g)]), weights[1], origin, small_origin),
+                *("sum_blocks", size, *common, len(all_rows[parent(g)]), weights[1], origin, small_origin, span),
                 *(self.clip_first, self.clip_stride, small, weights[0], table),
                 light=True,
             )
         else:
             self.program.run(
-                *("sum_frames", size, *common, weights[1], origin),
+                *("sum_frames", size, *common, weights[1], origin, span),
                 *(self.clip_first, self.clip_stride, self.frame, weights[0], table),
                 light=True,
             )
+
+    def _span(self, begin: int, end: int) -> int:
+        """Columns a work-item takes: whole rows of some clips on a CPU, else 64."""
+        return -(-int(self.stride[begin:end].max()) // 64) * 64 if self.program.is_cpu else 64
 
     def _batches(self, n_frames: int) -> list[tuple[int, int]]:
         """Cut the clips into runs of at most so many frames, at least one clip each."""
