@@ -10,6 +10,7 @@ import pytest
 from assets import matching_tables, tables
 from assets.formats import audio, bvh
 from assets.formats.audio import Audio
+from assets.formats.errors import FormatError
 from kernels.matching.score import reference_matches
 from kernels.synthetic.dancer import take
 from kernels.types import Clip
@@ -254,9 +255,8 @@ def test_a_device_that_is_not_there_is_an_error(studio):
     (studio / "odori.toml").write_text('[opencl]\ndevice = "no such thing"\n')
     before = lake(studio).path("match", "beat").read_bytes()
     (studio / "clips" / "kaede" / "kick.bvh").unlink()
-    outcome = dance(studio)
-    assert outcome.status == 2
-    assert "no such thing" in outcome.facts["error"]
+    with pytest.raises(FormatError, match="no such thing"):
+        dance(studio)
     assert lake(studio).path("match", "beat").read_bytes() == before
 
 
