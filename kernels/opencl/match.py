@@ -255,7 +255,7 @@ class Matcher:
         """Search one chunk; if the device's memory does not suffice, its halves."""
         try:
             found = self._search_device(song, chunk, floor, is_kept=is_kept)
-        except (cl.MemoryError, cl.RuntimeError, MemoryError) as error:
+        except (cl.MemoryError, MemoryError) as error:
             chunk.tables = None
             if len(chunk.clips) < 2:
                 raise MemoryError(
