@@ -173,13 +173,12 @@ def _pins(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
 
 def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], asked: Direction, costs: PathCosts) -> None:
     """Raise dg.Failure where pins cannot be kept, naming the fewest of them that cannot and what would help."""
-    n = len(known.is_allowed)
-    reach = Reach(known.graph, song.grid_s, costs=costs, starts=np.flatnonzero(known.is_allowed))
+    starts = np.flatnonzero(known.is_allowed)
+    reach = Reach(known.graph, song.grid_s, costs=costs, starts=starts, allowed=known.is_allowed)
     usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
-    everywhere = Pin("licences", 0, reach.n_intervals, known.is_allowed)
-    if not reach.keeps([everywhere]):
+    if not reach.is_danceable:
         return  # the search says why there is no dance at all
-    conflict = find_conflict(_Within(reach, everywhere), usable, choices=_choices(known, asked)) if n else None
+    conflict = find_conflict(reach, usable, choices=_choices(known, asked))
     if conflict is None:
         return
     told = direction.sentences(conflict, usable, asked.wishes, song, known.nodes)
@@ -205,17 +204,6 @@ def _choices(known: Catalogue, asked: Direction) -> dict[str, NDArray[np.bool_]]
         return -max((difflib.SequenceMatcher(None, label, wish).ratio() for wish in wished), default=0.0)
 
     return {label: labels[label] for label in sorted(labels, key=lambda label: (unlike(label), label))}
-
-
-class _Within(Reach):
-    """Reach with one pin more, that is never up for discussion."""
-
-    def __init__(self, reach: Reach, always: Pin) -> None:
-        self.__dict__.update(reach.__dict__)
-        self._always = always
-
-    def arrivals(self, pins: Sequence[Pin]) -> NDArray[np.bool_]:
-        return super().arrivals([*pins, self._always])
 
 
 def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:

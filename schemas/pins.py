@@ -18,7 +18,7 @@ Wishes: ``LABEL`` or ``label:LABEL``, ``style:STYLE``, ``clip:KEY``, ``not:LABEL
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from schemas.options import check, key
 
@@ -131,8 +131,3 @@ def parse_pin(text: str) -> PinWish:
         return PinWish(**values)  # type: ignore[arg-type]  # the names are those of its fields
     except ValueError as error:
         raise ValueError(f"{error}, in {text!r}") from error
-
-
-def pin_names() -> tuple[str, ...]:
-    """Keys that a ``[[pin]]`` table may have."""
-    return tuple(f.name for f in fields(PinWish))

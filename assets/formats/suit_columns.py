@@ -175,7 +175,7 @@ def _parquet(path: Path, name: str) -> Columns:
             )
         table = file.read()
     except (pa.ArrowInvalid, pa.ArrowNotImplementedError, OSError) as error:
-        if isinstance(error, FileNotFoundError | PermissionError | IsADirectoryError):
+        if isinstance(error, OSError) and error.errno is not None:  # the disk's own words; damage has no number
             raise
         said = str(error).splitlines()[0]
         raise FormatError(

@@ -124,6 +124,7 @@ class Reach:
     costs : PathCosts, for its bounds
     steps : kinds of step (m, d)
     starts : (M,) int64, nodes that may begin
+    allowed : (N,) bool or None, nodes that may be danced at all; None allows every one
 
     Notes
     -----
@@ -138,9 +139,11 @@ class Reach:
         *,
         costs: PathCosts,
         starts: Int,
+        allowed: Mask | None = None,
         steps: tuple[tuple[int, int], ...] = STEPS,
     ) -> None:
         self._starts, self._steps = starts, steps
+        self._allowed = np.ones(len(graph.clip_index), bool) if allowed is None else allowed
         self.n_intervals, self.n_nodes = len(beat_s) - 1, len(graph.clip_index)
         for self.bounds in (costs.hard_ratio, costs.last_resort_ratio):
             program = Program(
@@ -152,10 +155,9 @@ class Reach:
             if self.is_danceable:
                 break
 
-    @staticmethod
-    def _fit(program: Program, beat: int, kind: int) -> Mask | None:
+    def _fit(self, program: Program, beat: int, kind: int) -> Mask | None:
         cost = program.step_cost(beat, kind)
-        return None if cost is None else np.isfinite(cost)
+        return None if cost is None else np.isfinite(cost) & self._allowed
 
     def keeps(self, pins: Sequence[Pin]) -> bool:
         """Whether some dance of the whole song keeps all of these."""

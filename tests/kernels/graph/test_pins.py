@@ -144,3 +144,13 @@ def test_bad_pins(two_clips):
     with pytest.raises(ValueError, match="nodes"):
         admitted([Pin("p", 0, 1, np.ones(3, bool))], 5, 12)
     assert admitted([], 2, 3).all()
+
+
+def test_what_is_not_allowed_is_no_way(two_clips):
+    """With the second clip forbidden the first still carries the song, and a pin to the second cannot be kept."""
+    first = two_clips.clip_index == 0
+    beat_s = np.arange(6) * 0.5
+    only = Reach(two_clips, beat_s, costs=NO_USAGE, starts=np.array([0]), allowed=first)
+    assert only.is_danceable
+    assert not only.keeps([Pin("second", 4, 5, ~first)])
+    assert not Reach(two_clips, beat_s, costs=NO_USAGE, starts=np.array([0]), allowed=~first).is_danceable
