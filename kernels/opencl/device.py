@@ -34,6 +34,11 @@ class DeviceInfo:
         return f"{self.index}: {self.name} ({self.kind}, {self.platform})"
 
 
+def full_name(device: cl.Device) -> str:
+    """Name a device with its platform and driver, as metadata and reports have it."""
+    return f"{device.name.strip()} ({device.platform.name.strip()} {device.driver_version.strip()})"
+
+
 def list_devices() -> list[cl.Device]:
     """Find every OpenCL device, platforms in the loader's order.
 

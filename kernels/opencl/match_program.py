@@ -10,6 +10,8 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from kernels.opencl.device import full_name
+
 _LARGE_BYTES = 2**22
 _INDEX = ("match_index.cl",)
 _SEARCH = ("match_score.cl", "match_refine.cl")
@@ -52,7 +54,7 @@ class Program:
     def name(self) -> str:
         """Device and driver, for metadata: "AMD EPYC (Portable Computing Language 3.0)"."""
         device = self.device
-        return f"{device.name.strip()} ({device.platform.name.strip()} {device.driver_version.strip()})"
+        return full_name(device)
 
     def run(
         self,

@@ -9,6 +9,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from kernels.graph.distance import PoseFeatures, check_pair
+from kernels.opencl.device import full_name
 
 _ROWS = 8
 _LANES = (4, 8, 16)
@@ -59,9 +60,7 @@ class PoseDistance:
     @property
     def name(self) -> str:
         """Device and driver, for metadata: "AMD EPYC (Portable Computing Language 3.0)"."""
-        return (
-            f"{self._device.name.strip()} ({self._device.platform.name.strip()} {self._device.driver_version.strip()})"
-        )
+        return full_name(self._device)
 
     def __call__(self, rows: PoseFeatures, columns: PoseFeatures) -> NDArray[np.float32]:
         """Distances of every row to every column.

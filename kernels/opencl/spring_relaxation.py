@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from kernels.calibration.springs import JOINT_STIFFNESS, KEPT_SPEED, spring_body
 from kernels.calibration.tree_solver import BodyModel, Solved, Stream, check_stream
+from kernels.opencl.device import full_name
 
 _GROUP = 16
 
@@ -65,9 +66,7 @@ class SpringRelaxation:
     @property
     def name(self) -> str:
         """Device and driver, for metadata."""
-        return (
-            f"{self._device.name.strip()} ({self._device.platform.name.strip()} {self._device.driver_version.strip()})"
-        )
+        return full_name(self._device)
 
     def __call__(self, model: BodyModel, stream: Stream, *, iterations: int = 30) -> Solved:
         """Let the springs pull.

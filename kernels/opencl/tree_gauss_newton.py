@@ -10,6 +10,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from kernels.calibration.tree_solver import DAMPING, KINDNESS, BodyModel, Solved, Stream, check_stream
+from kernels.opencl.device import full_name
 
 _SCALE_M = 0.005  # variances are given in this, so that float32 works near 1
 _GROUP = 64
@@ -66,9 +67,7 @@ class TreeGaussNewton:
     @property
     def name(self) -> str:
         """Device and driver, for metadata."""
-        return (
-            f"{self._device.name.strip()} ({self._device.platform.name.strip()} {self._device.driver_version.strip()})"
-        )
+        return full_name(self._device)
 
     def __call__(self, model: BodyModel, stream: Stream, *, iterations: int = 2) -> Solved:
         """Fit a jointed body to its sensors, frame by frame.
