@@ -119,6 +119,27 @@ def _dance(
 
 
 @app.command()
+def why(
+    danced: Annotated[
+        str,
+        typer.Argument(metavar="DANCE", help="A song, 'SONG|METHOD', or a stage: .usdz or .usdc.", show_default=False),
+    ],
+    at: Annotated[float | None, typer.Option("--at", help="Second of the song; left out: the whole dance.")] = None,
+    studio: StudioOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say where a moment of a dance comes from: clip, time, blend, pace, licence, and why it was chosen.
+
+    Examples: odori why waltz --at 12.34 · odori why 'waltz|graph_2' · odori why dances/waltz/graph.usdz --at 12.34 (a
+    stage answers for itself and needs no studio)
+    """
+    from pipelines import commands
+
+    with _Trouble(as_json):
+        _finish(commands.why(_folder(studio), danced, at_s=at), as_json)
+
+
+@app.command()
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE.usd[cz]", help="The stage to look at.")],
     as_json: JsonOption = False,
