@@ -7,7 +7,7 @@ standard error. Exit status: 0 done, 1 done but some inputs were refused, 2 noth
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -89,15 +89,33 @@ def dance(
     alternatives: Annotated[
         int, typer.Option("--alternatives", help="How many different dances of each song to make.")
     ] = 1,
+    propose: Annotated[
+        str | None,
+        typer.Option("--propose", metavar="PLACE", help="Only list what could be pinned there, with its cost."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Dance a song: a USD stage with the music in it.
 
     Examples: odori dance waltz.mp3 · odori dance waltz --method matching · odori dance all ·
     odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY ·
-    odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3
+    odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3 ·
+    odori dance waltz --propose 42 · odori dance waltz --pin 12=spin --propose bar:9-10
     """
+    if propose is not None:
+        _propose(studio, songs, propose, pin or (), as_json)
     _dance(studio, songs, method, fps, out, as_json, pins=pin or (), alternatives=alternatives)
+
+
+def _propose(studio: Path | None, songs: list[str], place: str, pins: Sequence[str], as_json: bool) -> None:
+    from pipelines import commands
+    from pipelines.files import StudioError
+
+    with _Trouble(as_json):
+        if len(songs) != 1:
+            raise StudioError(f"--propose: want one song, got {len(songs)}; ask for each alone")
+        result = commands.propose(_folder(studio), songs[0], place, pins=pins, progress=_progress())
+        _finish(result, as_json)
 
 
 def _dance(
@@ -193,10 +211,10 @@ def status(studio: StudioOption = None, as_json: JsonOption = False) -> None:
 
     Examples: odori status · odori status --json
     """
-    from pipelines import commands
+    from pipelines.status import status as say_status
 
     with _Trouble(as_json):
-        _finish(commands.status(_folder(studio)), as_json)
+        _finish(say_status(_folder(studio)), as_json)
 
 
 @app.command()
