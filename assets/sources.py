@@ -107,10 +107,12 @@ class Request:
     ----------
     frame_rate_hz : frames a second of the stage; 0 for the setting
     pins : as on the command line; beside those of the brief
+    character : clip or USD file whose body is danced with; "" for the brief's
     """
 
     frame_rate_hz: float = 0.0
     pins: tuple[str, ...] = ()
+    character: str = ""
 
 
 class Studio(Protocol):
@@ -369,10 +371,14 @@ def request_of(studio: Studio, key: str) -> Request:
 
 
 def request_version(studio: Studio, key: str, sources: Sources | None = None) -> str:
-    """Version of what was asked of a dance: by the command, and by the brief of its song, of known sources or now's."""
+    """Version of what was asked of a dance: by the command, and by the brief of its song, of known sources or now's.
+
+    Whose body it is danced with comes later: :func:`assets.characters.character_version`.
+    """
     brief = brief_of(studio, key.split("|")[0], sources)
     directed = {"pin": [pin.text for pin in brief.pin], "pins": brief.pins, "allow": sorted(brief.allow)}
-    return fingerprint([asdict(request_of(studio, key)), directed])
+    asked = request_of(studio, key)
+    return fingerprint([{"frame_rate_hz": asked.frame_rate_hz, "pins": asked.pins}, directed])
 
 
 def brief_of(studio: Studio, song: str, sources: Sources | None = None) -> Brief:

@@ -89,6 +89,9 @@ def dance(
     alternatives: Annotated[
         int, typer.Option("--alternatives", help="How many different dances of each song to make.")
     ] = 1,
+    character: Annotated[
+        str, typer.Option("--character", metavar="CLIP|FILE.usd", help="Whose body dances; else as the brief says.")
+    ] = "",
     propose: Annotated[
         str | None,
         typer.Option("--propose", metavar="PLACE", help="Only list what could be pinned there, with its cost."),
@@ -100,11 +103,12 @@ def dance(
     Examples: odori dance waltz.mp3 · odori dance waltz --method matching · odori dance all ·
     odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY ·
     odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3 ·
-    odori dance waltz --propose 42 · odori dance waltz --pin 12=spin --propose bar:9-10
+    odori dance waltz --propose 42 · odori dance waltz --pin 12=spin --propose bar:9-10 ·
+    odori dance waltz --character hero.usdz · odori dance waltz --character ayame-step_01
     """
     if propose is not None:
         _propose(studio, songs, propose, pin or (), as_json)
-    _dance(studio, songs, method, fps, out, as_json, pins=pin or (), alternatives=alternatives)
+    _dance(studio, songs, method, fps, out, as_json, pins=pin or (), alternatives=alternatives, character=character)
 
 
 def _propose(studio: Path | None, songs: list[str], place: str, pins: Sequence[str], as_json: bool) -> None:

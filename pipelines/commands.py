@@ -14,7 +14,7 @@ from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES
 from assets.sources import Request, Song
 from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
-from pipelines import dancing, proposing
+from pipelines import casting, dancing, proposing
 from pipelines import why as explaining
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
@@ -135,6 +135,7 @@ def dance(
     progress: Callable[[], Any],
     pins: Sequence[str] = (),
     alternatives: int = 1,
+    character: str = "",
 ) -> Outcome:
     """Dance songs, building first what they need and nothing else; by their briefs' methods where none is given."""
     studio = existing(root)
@@ -147,13 +148,14 @@ def dance(
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
     work = _Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
+    character = casting.named(studio, work.state.sources, character)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
     methods = {song.key: _ways(method or _briefed_method(studio, song), alternatives) for song in songs}
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
     before = studio.requests()
     for key in sorted(keys):
-        studio.remember(key, Request(frame_rate_hz or 0.0, pins))
+        studio.remember(key, Request(frame_rate_hz or 0.0, pins, character))
     names = {song.key for song in songs}
     report = work.run(
         building.GROUPS,
