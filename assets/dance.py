@@ -16,7 +16,7 @@ from assets.formats.audio import Audio
 from assets.lineage import Part, Progress, Stored
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.sources import Studio, request_of, request_version
-from kernels.assembly import quality
+from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.quality import Measure
@@ -113,8 +113,8 @@ def dance_quality(
     found = {
         "beats": [*quality.lag_measures(dance, steps, beat_s), *quality.beat_measures(dance, beat_s)],
         "warp": quality.warp_measures(steps),
-        "seams": quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
-        "feet": quality.foot_measures(dance, steps, clips),
+        "seams": seam_quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
+        "feet": foot_quality.foot_measures(dance, steps, clips),
         "catalogue": quality.catalogue_measures(steps, _seconds(clip)),
     }
     progress.step()
