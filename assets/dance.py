@@ -69,6 +69,7 @@ def assembly(
         skeleton=CANONICAL,
         frame_rate_hz=request_of(studio, key).frame_rate_hz or settings.frame_rate_hz,
         duration_s=float(steps.song_end_s[-1]),
+        shape=settings.blend_shape,
     )
     if settings.lock_feet:
         dance = lock_feet(dance, planted_feet(dance, steps, clips))

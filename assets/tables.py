@@ -305,7 +305,10 @@ def from_motion_graph_node(
         pa.array(graph.time_s),
         pa.array(graph.next_node, pa.int32()),
         pa.array([labels[c] for c in graph.clip_index], pa.string()),
-        pa.array(np.zeros(len(graph.time_s)) if graph.accent is None else graph.accent, pa.float32()),
+        *(
+            pa.array(np.zeros(len(graph.time_s)) if values is None else values, pa.float32())
+            for values in (graph.accent, graph.peak_jerk, graph.usual_jerk)
+        ),
         pa.array(is_kept),
     ]
     return MOTION_GRAPH_NODE.check(pa.table(columns, schema=MOTION_GRAPH_NODE.arrow))
@@ -344,6 +347,8 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
         target=target[inside],
         weight=to_numbers(edge["edge_cost"]).astype(np.float64)[inside],
         accent=to_numbers(node["accent_score"]).astype(np.float64),
+        peak_jerk=to_numbers(node["jerk_m_per_s3"]).astype(np.float64),
+        usual_jerk=to_numbers(node["clip_jerk_m_per_s3"]).astype(np.float64),
     )
     return graph, clip_ids
 

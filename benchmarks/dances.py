@@ -37,7 +37,9 @@ def judge(studio: BuiltStudio, danced: Danced, frame_rate_hz: float) -> tuple[di
     """Assemble one dance and measure it: figures, seams, the same seams cut."""
     steps, clips, settings = danced.steps, studio.clips(danced.steps), studio.settings.dance
     end_s = float(steps.song_end_s[-1])
-    dance = assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=frame_rate_hz, duration_s=end_s)
+    dance = assemble(
+        steps, clips, skeleton=CANONICAL, frame_rate_hz=frame_rate_hz, duration_s=end_s, shape=settings.blend_shape
+    )
     if settings.lock_feet:
         dance = lock_feet(dance, planted_feet(dance, steps, clips))
     blended, cut = seam_quality.seam_ratios(dance, steps, clips, skeleton=CANONICAL)

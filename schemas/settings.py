@@ -156,6 +156,11 @@ class DanceSettings(_Checked):
     blend_s: float = key(
         0.4, "Song time over which two clips are blended, centred on the beat of the seam.", least=0, most=2
     )
+    blend_shape: str = key(
+        "slerp",
+        "'slerp' (eased), 'linear_slerp' (the document's) or 'inertial' (springs both ways): docs/seams.md.",
+        values=("slerp", "linear_slerp", "inertial"),
+    )
     lock_feet: bool = key(True, "Keep feet where they stand: root and legs give way to contacts of the clips.")
 
 
