@@ -189,10 +189,10 @@ def status(studio: StudioOption = None, as_json: JsonOption = False) -> None:
 
     Examples: odori status · odori status --json
     """
-    from pipelines import commands
+    from pipelines.status import status as say_status
 
     with _Trouble(as_json):
-        _finish(commands.status(_folder(studio)), as_json)
+        _finish(say_status(_folder(studio)), as_json)
 
 
 @app.command()

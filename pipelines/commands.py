@@ -12,7 +12,7 @@ from sqlalchemy.exc import DBAPIError
 
 from assets.formats import usd_package
 from assets.formats.errors import FormatError
-from assets.lineage import Progress, content_version
+from assets.lineage import Progress
 from assets.motion import beat_settings
 from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES, base_method
 from assets.sources import Request, Song
@@ -21,15 +21,12 @@ from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
 from pipelines.files import StudioError, write_beside
-from pipelines.freshness import Finding, Freshness
+from pipelines.freshness import Freshness
 from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
 from pipelines.resources import StudioFolder
+from pipelines.status import any_read, clips_of, counts, refusals, songs_of
 from pipelines.web import existing
-from schemas.motion import CANONICAL_POSE
-from schemas.music import SONG
 from schemas.pins import parse_pin
-
-LONGEST_LIST = 40
 
 
 class _Session:
@@ -98,20 +95,20 @@ def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
         raise StudioError(f"{root}: want clips under clips/ and songs under songs/, got none; put some there")
     groups = building.GROUPS if dances else [g for g in building.GROUPS if g != "dance"]
     report = work.run(groups)
-    clips, songs = _clips(work.state, studio), _songs(work.state, studio)
+    clips, songs = clips_of(work.state, studio), songs_of(work.state, studio)
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
     facts = {
-        "clips": _counts(clips),
-        "songs": _counts(songs),
+        "clips": counts(clips),
+        "songs": counts(songs),
         "refused": [{"path": f["path"], "reason": f["reason"]} for f in refused],
         "ran": [{"assets": list(b.assets), "partitions": list(b.keys)} for b in report.ran],
         "failed": report.failed,
         "notes": list(sources.notes),
     }
-    troubles = [*_refusals(refused), *(f"failed: {f}" for f in report.failed), *(f"note: {n}" for n in sources.notes)]
+    troubles = [*refusals(refused), *(f"failed: {f}" for f in report.failed), *(f"note: {n}" for n in sources.notes)]
     status = (
         NOTHING_DONE
-        if report.failed and not _any_read(clips, songs)
+        if report.failed and not any_read(clips, songs)
         else SOME_REFUSED
         if refused or report.failed
         else DONE
@@ -170,7 +167,7 @@ def dance(
         assets=set().union(*(work.state.needed_for(key) for key in keys)),
     )
     state = freshness(studio)
-    refused = {f["key"]: f["reason"] for f in _songs(state, studio) if f["state"] == "refused"}
+    refused = {f["key"]: f["reason"] for f in songs_of(state, studio) if f["state"] == "refused"}
     made, troubles = [], []
     for song, way in [(one, way) for one in songs for way in methods[one.key]]:
         key = f"{song.key}|{way}"
@@ -352,129 +349,3 @@ def check(file: Path) -> Outcome:
     lines = [f"{f.severity}: {f.rule}: {f.prim_path}: {f.sentence}" for f in findings]
     verdict = f"{file}: {'valid' if not errors else f'{len(errors)} errors'}"
     return Outcome(SOME_REFUSED if errors else DONE, facts, "\n".join([*lines, verdict]))
-
-
-def status(root: Path) -> Outcome:
-    """Say what is fresh, stale, failed or refused."""
-    studio = existing(root)
-    state = freshness(studio)
-    (clips, doubts), songs = _clips_and_doubts(state, studio), _songs(state, studio)
-    failures = building.last_failures(building.open_instance(studio)) if studio.dagster_home.is_dir() else {}
-    assets = [_asset_facts(f, state, failures) for f in state.findings()]
-    refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
-    notes = list(state.sources.notes)
-    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes, "warnings": doubts}
-    report = _status_report(studio, clips, songs, assets, refused, notes, doubts)
-    return Outcome(SOME_REFUSED if refused else DONE, facts, report)
-
-
-def _asset_facts(finding: Finding, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:
-    failure = failures.get((finding.asset, finding.key)) if finding.state in ("stale", "missing") else None
-    return {
-        "asset": finding.asset,
-        "partition": finding.key,
-        "group": state.assets[finding.asset].group,
-        "state": "failed" if failure else finding.state,
-        "why": failure or finding.why,
-    }
-
-
-def _status_report(
-    studio: StudioFolder,
-    clips: list[dict[str, Any]],
-    songs: list[dict[str, Any]],
-    assets: list[dict[str, Any]],
-    refused: list[dict[str, Any]],
-    notes: list[str],
-    doubts: list[dict[str, str]],
-) -> str:
-    lines = [f"studio {studio.root}"]
-    for name, files in (("clips", clips), ("songs", songs)):
-        counts = _counts(files)
-        lines.append(
-            f"  {name}: " + ", ".join(f"{n} {state}" for state, n in counts.items() if n) + ("" if files else "none")
-        )
-    unfresh = [a for a in assets if a["state"] != "fresh"]
-    lines.append(f"  assets: {len(assets) - len(unfresh)} partitions fresh, {len(unfresh)} not")
-    lines += [f"    {a['state']}: {a['asset']}[{a['partition']}]: {a['why']}" for a in unfresh[:LONGEST_LIST]]
-    lines += _more(unfresh)
-    lines += [f"  {line}" for line in _refusals(refused)]
-    doubtful = [f"  warning: {doubt['path']}: {doubt['warning']}" for doubt in doubts]
-    lines += doubtful[:LONGEST_LIST] + _more(doubtful)
-    lines += [f"  note: {note}" for note in notes]
-    return "\n".join(lines)
-
-
-def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
-    """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
-    return _clips_and_doubts(state, studio)[0]
-
-
-def _clips_and_doubts(state: Freshness, studio: StudioFolder) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
-    """List the motion files, and what is doubtful about those that were read."""
-    stored = {}
-    for session in studio.lake.keys("clip"):
-        if studio.lake.stamp("clip", session) is None:  # of an older version: as if it were not there
-            continue
-        for row in studio.lake.table("clip", session).to_pylist():
-            stored[row["path"]] = row
-    unplaced = {session: _unplaced(state, session) for session in studio.lake.keys("canonical_pose")}
-    found: list[dict[str, Any]] = []
-    doubts: list[dict[str, str]] = []
-    for clip in state.sources.clips:
-        path = clip.path.encode("utf-8", "backslashreplace").decode()
-        row = stored.get(path)
-        seen = _seen(row, clip.sha256, clip.problem)
-        if seen["state"] == "read" and clip.key in unplaced.get(clip.session, ()):
-            seen = {"state": "refused", "reason": "its motion could not be brought to the canonical skeleton"}
-        warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
-        found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
-        doubts += [{"path": path, "warning": sentence} for sentence in warnings]
-    return found, doubts
-
-
-def _unplaced(state: Freshness, session: str) -> set[str]:
-    """Clips of a session that were read and have no canonical pose."""
-    stamp = state.stamp("canonical_pose", session)
-    return {clip for clip, made in stamp.clips.items() if made.content == _NO_POSE} if stamp else set()
-
-
-_NO_POSE = content_version(CANONICAL_POSE.empty())
-
-
-def _songs(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
-    stored = {}
-    for key in studio.lake.keys(SONG.name):
-        for row in studio.lake.table(SONG.name, key).to_pylist():
-            stored[row["path"]] = row
-    found = []
-    for song in state.sources.songs:
-        path = song.path.encode("utf-8", "backslashreplace").decode()
-        found.append({"path": path, "key": song.key, **_seen(stored.get(path), song.sha256, song.problem)})
-    return found
-
-
-def _seen(row: dict[str, Any] | None, sha256: str, problem: str) -> dict[str, Any]:
-    if problem:
-        return {"state": "refused", "reason": problem}
-    if row is None:
-        return {"state": "new", "reason": None}
-    if row["source_sha256"] != sha256:
-        return {"state": "changed", "reason": None}
-    return {"state": row["state"], "reason": row["reason"]}
-
-
-def _counts(files: list[dict[str, Any]]) -> dict[str, int]:
-    return {state: sum(f["state"] == state for f in files) for state in ("read", "refused", "new", "changed")}
-
-
-def _any_read(*lists: list[dict[str, Any]]) -> bool:
-    return any(f["state"] == "read" for files in lists for f in files)
-
-
-def _refusals(refused: list[dict[str, Any]]) -> list[str]:
-    return [f"refused: {f['path']}: {f['reason']}" for f in refused]
-
-
-def _more(items: Sequence[object]) -> list[str]:
-    return [f"    … and {len(items) - LONGEST_LIST} more"] if len(items) > LONGEST_LIST else []

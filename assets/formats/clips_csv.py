@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import io
 import math
 from collections.abc import Mapping, Sequence
@@ -102,8 +103,20 @@ def _seconds(text: str, path: str, line: int) -> float:
     return value
 
 
-def look_up(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> Facts | None:
-    """Find what a ``clips.csv`` says of a file.
+def misspelt_columns(data: bytes) -> dict[str, str]:
+    """Name the columns nobody reads that are nearly one we read, which goes unnamed, and that one.
+
+    Other columns are a data set's own business. Empty for what is no table.
+    """
+    header = next(csv.reader(io.StringIO(data.decode("utf-8-sig", errors="replace"), newline="")), [])
+    names = [name.strip().lower() for name in header]
+    wanted = [ours[0] for ours in COLUMNS.values() if not set(ours) & set(names)]
+    found = {name: difflib.get_close_matches(name, wanted, n=1, cutoff=0.75) for name in names if name}
+    return {name: near[0] for name, near in found.items() if near}
+
+
+def row_of(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> str | None:
+    """Find the row of a ``clips.csv`` that speaks of a file.
 
     Rows may name the file alone or with some of its folders: the longest row that the file's path ends with counts.
 
@@ -114,14 +127,14 @@ def look_up(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> Fa
 
     Returns
     -------
-    Facts or None
-        None when no row names it.
+    str or None
+        The file as the row writes it; None when no row names it.
     """
     parts = [*folders, name]
     for start in range(len(parts)):
-        found = facts.get("/".join(parts[start:]))
-        if found is not None:
-            return found
+        ending = "/".join(parts[start:])
+        if ending in facts:
+            return ending
     # A row may also carry folders the studio does not have: data sets list their files from their own root.
     endings = [key for key in facts if key.rsplit("/", 1)[-1] == name]
-    return facts[endings[0]] if len(endings) == 1 else None
+    return endings[0] if len(endings) == 1 else None
