@@ -12,7 +12,7 @@ from assets.declare import table_asset, table_assets
 from assets.lineage import Part, Progress, Stored
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.sources import Studio, request_of, request_version
-from kernels.assembly import quality
+from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.quality import Measure
@@ -64,6 +64,7 @@ def assembly(
         skeleton=CANONICAL,
         frame_rate_hz=request_of(studio, key).frame_rate_hz or settings.frame_rate_hz,
         duration_s=float(steps.song_end_s[-1]),
+        shape=settings.blend_shape,
     )
     if settings.lock_feet:
         dance = lock_feet(dance, planted_feet(dance, steps, clips))
@@ -108,8 +109,8 @@ def dance_quality(
     found = {
         "beats": [*quality.lag_measures(dance, steps, beat_s), *quality.beat_measures(dance, beat_s)],
         "warp": quality.warp_measures(steps),
-        "seams": quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
-        "feet": quality.foot_measures(dance, steps, clips),
+        "seams": seam_quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
+        "feet": foot_quality.foot_measures(dance, steps, clips),
         "catalogue": quality.catalogue_measures(steps, _seconds(clip)),
     }
     progress.step()

@@ -76,7 +76,7 @@ def dance(
     studio: StudioOption = None,
     method: Annotated[
         str | None,
-        typer.Option("--method", help="How the steps are chosen: graph or matching; else as the brief says, or graph."),
+        typer.Option("--method", help="How the steps are chosen: graph, matching or hmm; else as the brief says."),
     ] = None,
     fps: Annotated[
         float | None, typer.Option("--fps", help="Frames a second of the stage.", min=1.0, max=240.0)
@@ -96,6 +96,11 @@ def dance(
         str | None,
         typer.Option("--propose", metavar="PLACE", help="Only list what could be pinned there, with its cost."),
     ] = None,
+    temperature: Annotated[
+        float | None,
+        typer.Option("--temperature", help="Of hmm: 0 the most probable dance, 1 one drawn as the dancer would."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Another number, another draw.", min=0)] = 0,
     as_json: JsonOption = False,
 ) -> None:
     """Dance a song: a USD stage with the music in it.
@@ -104,11 +109,24 @@ def dance(
     odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY ·
     odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3 ·
     odori dance waltz --propose 42 · odori dance waltz --pin 12=spin --propose bar:9-10 ·
-    odori dance waltz --character hero.usdz · odori dance waltz --character ayame-step_01
+    odori dance waltz --character hero.usdz · odori dance waltz --character ayame-step_01 ·
+    odori dance groove.mid --method hmm --temperature 0.5 --seed 2
     """
     if propose is not None:
         _propose(studio, songs, propose, pin or (), as_json)
-    _dance(studio, songs, method, fps, out, as_json, pins=pin or (), alternatives=alternatives, character=character)
+    _dance(
+        studio,
+        songs,
+        method,
+        fps,
+        out,
+        as_json,
+        pins=pin or (),
+        alternatives=alternatives,
+        character=character,
+        temperature=temperature,
+        seed=seed,
+    )
 
 
 def _propose(studio: Path | None, songs: list[str], place: str, pins: Sequence[str], as_json: bool) -> None:

@@ -10,7 +10,7 @@ from sqlalchemy.exc import DBAPIError
 from assets.formats.errors import FormatError
 from assets.lineage import Progress
 from assets.motion import beat_settings
-from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES
+from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES, base_method
 from assets.sources import Request, Song
 from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
@@ -136,6 +136,8 @@ def dance(
     pins: Sequence[str] = (),
     alternatives: int = 1,
     character: str = "",
+    temperature: float | None = None,
+    seed: int = 0,
 ) -> Outcome:
     """Dance songs, building first what they need and nothing else; by their briefs' methods where none is given."""
     studio = existing(root)
@@ -155,8 +157,10 @@ def dance(
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
     before = studio.requests()
     for key in sorted(keys):
-        studio.remember(key, Request(frame_rate_hz or 0.0, pins, character))
+        studio.remember(key, Request(frame_rate_hz or 0.0, pins, character, temperature, seed))
     names = {song.key for song in songs}
+    if any(base_method(chosen) == "hmm" for ways in methods.values() for chosen in ways):
+        names |= work.state.sources.performed_songs  # what the dancer danced to is what the model learns from
     report = work.run(
         building.GROUPS,
         keys=lambda kind, key: key in keys if kind == "dance" else key in names if kind == "song" else True,

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.costs import PathCosts, is_within, usage_cost, warp_cost
+from kernels.graph.costs import PathCosts, is_within, rough_cost, usage_cost, warp_cost
 from kernels.graph.program import Move, Program
 from kernels.graph.repetition import spread
 from kernels.types import Choreography, Float, Int, MotionGraph
@@ -267,7 +267,8 @@ def more_than_any(
     stride = max(costs.stride * abs(float(np.log2(m / d))) for m, d in steps)
     largest = float(graph.weight.max(initial=0.0))
     scale = costs.transition_scale or (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
-    seam = costs.seam + costs.transition * largest / scale + costs.jump_back
+    roughest = float(rough_cost(graph, costs).max(initial=0.0))
+    seam = costs.seam + costs.transition * largest / scale + roughest + costs.jump_back
     missed = costs.missed_beat * max(d for _, d in steps)
     most = 1.0 + n_beats * (warp + stride + seam + missed + longest * costs.usage * n_beats * longest)
     if stretch_price is not None and stretch_price.size:

@@ -21,7 +21,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.costs import PathCosts, beat_cost, is_within, jump_back_cost, stride_cost, transition_cost, warp_cost
+from kernels.graph.costs import (
+    PathCosts,
+    beat_cost,
+    is_within,
+    jump_back_cost,
+    rough_cost,
+    stride_cost,
+    transition_cost,
+    warp_cost,
+)
 from kernels.types import Float, Int, MotionGraph
 
 Mask = NDArray[np.bool_]
@@ -77,7 +86,8 @@ class Program:
         self._admissible, self._bounds, self._outside_price = admissible, bounds, outside_price
         order = np.lexsort((graph.target, graph.source))
         self._source, self._target = graph.source[order], graph.target[order]
-        self.seam, self.jump_back = transition_cost(graph, costs)[order], jump_back_cost(graph, costs)[order]
+        self.seam = (transition_cost(graph, costs) + rough_cost(graph, costs))[order]
+        self.jump_back = jump_back_cost(graph, costs)[order]
         self._edge_cost = self.seam + self.jump_back
         self._leaving, self._first_edge = np.unique(self._source, return_index=True)
         self._edge_of = np.searchsorted(self._source, np.arange(self.n_nodes + 1))
