@@ -9,6 +9,7 @@ import dagster as dg
 import numpy as np
 import polars as pl
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from assets import licences, tables
 from assets.characters import Cast, CharacterError, character_of, character_version, dress, read_clip, read_file
@@ -81,6 +82,7 @@ def usd_animation(
         tables.to_array(dance_pose["rotation_wxyz"]),
     )
     provenance = _provenance(played, method, steps, clip)
+    refuse_changed(frame_lineage, {row["clip_id"]: row["licence"] for row in provenance["clips"]})
     cast = _cast(character_of(studio, key), studio, skeleton, pose)
     if cast is not None:
         moved, provenance["character"] = dress(moved, cast)
@@ -97,6 +99,22 @@ def usd_animation(
     )
     progress.step()
     return stage
+
+
+def refuse_changed(frames: pa.Table, licence_of: Mapping[str, str]) -> None:
+    """Raise dg.Failure where a clip that may not be changed is blended with another: a promise to its author.
+
+    Methods of dancing keep such clips out of their seams; this is the last look before anything leaves the studio.
+    """
+    whole = {clip for clip, name in licence_of.items() if not licences.may_be_joined(name)}
+    blended = frames.filter(pc.is_valid(frames["blend_clip_id"]))
+    touched = sorted(whole & {*blended["clip_id"].to_pylist(), *blended["blend_clip_id"].to_pylist()})
+    if touched:
+        raise dg.Failure(
+            f"want clips whose licence forbids changes left whole, got {', '.join(touched)} in a blend; leave them out "
+            "with 'allow' in the brief",
+            allow_retries=False,
+        )
 
 
 def _cast(text: str, studio: Studio, skeleton: Stored, pose: Stored) -> Cast | None:
