@@ -107,7 +107,10 @@ def stretch(wish: PinWish, song: Song) -> tuple[int, int]:
     """
     n = len(song.grid_s) - 1
     if wish.place:
-        return (0, 1) if wish.place == "start" else (n - 1, n)
+        # A first or last interval of which the song has less than half is no moment of its own.
+        seen = np.diff(np.clip(song.grid_s, 0.0, song.duration_s)) >= np.diff(song.grid_s) / 2
+        whole = np.flatnonzero(seen) if seen.any() else np.arange(n)
+        return (0, int(whole[0]) + 1) if wish.place == "start" else (int(whole[-1]), n)
     if wish.beat:
         return _counted(wish, "beat", wish.beat, wish.until_beat or wish.beat + 1, np.arange(len(song.own)) + 1, song)
     if wish.bar:

@@ -126,3 +126,14 @@ def test_what_could_be_wished_instead_is_of_the_same_kind(nodes):
     assert list(nodes.instead_of(parse_pin("1=style:hop")))[:2] == ["style:hip", "style:x"]
     assert next(iter(nodes.instead_of(parse_pin("1=clip:a")))) == "clip:a"
     assert list(nodes.instead_of(parse_pin("1=not:spin"))) == ["spin", "walk"]
+
+
+def test_the_start_and_the_end_are_moments_one_can_see(nodes):
+    beats = BeatGrid(np.arange(1, 9) * 0.5, np.zeros(8, int), np.zeros(8, int), np.ones(8))
+    song = Song(np.arange(10) * 0.5 - 0.4, beats, 4.2)
+    start, end = (to_pin(parse_pin(f"{place}=spin"), song, nodes) for place in ("start", "end"))
+    assert (start.first, start.last) == (0, 2)  # of the first interval the song has a fifth
+    assert (end.first, end.last) == (8, 9)  # of the last most of it, from 3.6 to 4.1
+    short = Song(np.arange(10) * 0.5 - 0.4, beats, 3.7)
+    end = to_pin(parse_pin("end=spin"), short, nodes)
+    assert (end.first, end.last) == (7, 9)
