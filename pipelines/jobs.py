@@ -19,7 +19,9 @@ rebuild_music = dg.define_asset_job(
     "rebuild_music", dg.AssetSelection.groups("music"), description="Read songs and find their beats."
 )
 rebuild_catalog = dg.define_asset_job(
-    "rebuild_catalog", dg.AssetSelection.groups("catalog"), description="Build the motion graph over all clips."
+    "rebuild_catalog",
+    dg.AssetSelection.groups("catalog"),
+    description="Build the motion graph and the model of the dancer over all clips.",
 )
 match_songs = dg.define_asset_job(
     "match_songs", dg.AssetSelection.assets("match"), description="Find the clips that match each segment of a song."
