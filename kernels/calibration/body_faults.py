@@ -21,6 +21,7 @@ from kernels.types import Float
 _MOST_FRAMES, _LEAST_FRAMES = 2000, 200
 _ENOUGH_FRAMES, _GOOD_FRAMES = 240, 960
 _SWAP_RATIO = 0.8  # one exchange: at most 0.61 where labels are exchanged, at least 1.6 where they are right
+_MOST_SWAPS = 4
 _TREE_RATIO, _TREE_M = 3.0, 0.010
 _BETTER_RATIO = 0.5
 _SIDE = 0.3
@@ -109,15 +110,21 @@ def _rotation_order(turned: Float, place: Float, residual: Float) -> tuple[Findi
 
 
 def _labels(residual: Float) -> tuple[Finding, ...]:
-    a, b, ratio = find_swap(residual, PARENT)
-    if ratio >= _SWAP_RATIO:
-        return ()
-    one, other = SENSORS[a], SENSORS[b]
-    sentence = (
-        f"{one}, {other}: want each sensor on its own segment, got two that fit exchanged (joints {1 / ratio:.1f} "
-        f"times closer); exchange the labels {one} and {other}"
-    )
-    return (Finding("error", one, None, sentence),)
+    """Find labels that are exchanged: two, and after those two others, as long as that helps."""
+    found: list[Finding] = []
+    order = np.arange(len(SENSORS))
+    while len(found) < _MOST_SWAPS:
+        a, b, ratio = find_swap(residual[np.ix_(order, order)], PARENT)
+        if ratio >= _SWAP_RATIO:
+            break
+        one, other = SENSORS[a], SENSORS[b]
+        sentence = (
+            f"{one}, {other}: want each sensor on its own segment, got two that fit exchanged (joints {1 / ratio:.1f} "
+            f"times closer); {'then ' if found else ''}exchange the labels {one} and {other}"
+        )
+        found.append(Finding("error", one, None, sentence))
+        order[[a, b]] = order[[b, a]]
+    return tuple(found)
 
 
 def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]) -> tuple[Finding, ...]:
@@ -151,6 +158,8 @@ def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]
     else:
         return ()
     sentence = f"{sensor}: want left sensors on the left, got {got}; exchange l_ and r_ of {what}"
+    if sensor == "l_shoulder" and legs in what:
+        sentence += ", or, if the labels are right, set the tracker's hemisphere: every position is mirrored"
     return (Finding("error", sensor, None, sentence),)
 
 

@@ -39,6 +39,18 @@ def test_exchanged_labels_are_both_named(made, one, other):
     assert {one, other} == set(found[0].sentence.split(":")[0].split(", "))
 
 
+def test_labels_exchanged_in_a_ring_are_told_step_by_step(made):
+    ring = suit.swap(suit.swap(made.recording, {"l_upper_arm": "l_forearm"}), {"l_forearm": "l_hand"})
+    cleaned = clean(ring)
+    found = [one for one in find_body_faults(cleaned, solve_joints(cleaned)) if "exchange the labels" in one.sentence]
+    assert len(found) == 2
+    mended = ring
+    for one in found:
+        a, b = one.sentence.split(":")[0].split(", ")
+        mended = suit.swap(mended, {a: b})
+    np.testing.assert_array_equal(mended.is_valid, made.recording.is_valid)
+
+
 def test_the_world_may_be_turned(made, pairs, cleaned):
     # a rule that used the direction of gravity would fail here
     turn = np.array([0.5, -0.5, 0.5, 0.5])
