@@ -15,6 +15,7 @@ warnings.filterwarnings("ignore", category=dg.BetaWarning)
 SETTINGS_KEY = "odori/settings"
 SOURCES_KEY = "odori/sources"
 METHODS_KEY = "odori/methods"
+KEEPS_KEY = "odori/keeps"
 
 
 def table_asset(
@@ -29,6 +30,7 @@ def table_asset(
     checks: Mapping[str, str] | None = None,
     methods: Mapping[str, str] | None = None,
     io_manager: str = "lake",
+    keeps: bool = False,
 ) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
     """Declare an asset that stores a table of its own name.
 
@@ -44,13 +46,14 @@ def table_asset(
     checks : asset checks it yields, by name, each with what it believes
     methods : of a dance, the one method that needs an input or a section of settings (``[section]``), by its name
     io_manager : who stores it
+    keeps : once made it stays when its inputs change; only its code, its settings or a person make it anew
     """
     made: Callable[[Callable[..., Any]], dg.AssetsDefinition] = dg.asset(
         name=table.name,
         group_name=group,
         code_version=code_version,
         description=table.meaning,
-        metadata=_metadata(table, settings, sources, methods or {}),
+        metadata=_metadata(table, settings, sources, methods or {}, keeps=keeps),
         io_manager_key=io_manager,
         partitions_def=partitions,
         backfill_policy=_backfill(partitions),
@@ -100,8 +103,12 @@ def _backfill(partitions: dg.PartitionsDefinition[str] | None) -> dg.BackfillPol
     return dg.BackfillPolicy.single_run() if isinstance(partitions, dg.DynamicPartitionsDefinition) else None
 
 
-def _metadata(table: Table, settings: str, sources: str, methods: Mapping[str, str] | None = None) -> dict[str, Any]:
+def _metadata(
+    table: Table, settings: str, sources: str, methods: Mapping[str, str] | None = None, *, keeps: bool = False
+) -> dict[str, Any]:
     said = {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
+    if keeps:
+        said[KEEPS_KEY] = "true"
     if methods:
         said[METHODS_KEY] = " ".join(f"{name}={method}" for name, method in methods.items())
     return said

@@ -144,9 +144,7 @@ def fingerprint(facts: object) -> str:
 
 def session_version(clips: Iterable[Clip]) -> str:
     """Version of a session's sources: which files, with which bytes, labelled how."""
-    return fingerprint(
-        [[c.path, c.sha256, c.facts.label, c.facts.style, c.facts.subject, c.facts.licence, c.problem] for c in clips]
-    )
+    return fingerprint([[c.path, c.sha256, asdict(c.facts), c.problem] for c in clips])
 
 
 def song_version(songs: Iterable[Song]) -> str:
@@ -273,8 +271,8 @@ def _facts_of(said: Iterable[_Said], file: File) -> Facts:
             if row is not None:
                 table.used.add(row)
                 found = table.facts[row]
-                return found if found.label else replace(found, label=fallback)
-    return Facts(label=fallback)
+                return found if found.label else replace(found, label=fallback, is_labelled=False)
+    return Facts(label=fallback, is_labelled=False)
 
 
 def _hashed(root: Path, file: File, cache: HashCache, now_ns: int) -> tuple[str, str]:

@@ -32,7 +32,7 @@ from schemas.pins import parse_pin
 LONGEST_LIST = 40
 
 
-class _Session:
+class Session:
     """A studio opened for work: held, tidied, its definitions loaded."""
 
     def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
@@ -92,7 +92,7 @@ def check_settings(studio: StudioFolder) -> None:
 def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
     """Bring a studio up to date."""
     studio = existing(root)
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     sources = work.state.sources
     if not sources.clips and not sources.songs:
         raise StudioError(f"{root}: want clips under clips/ and songs under songs/, got none; put some there")
@@ -150,7 +150,7 @@ def dance(
     pins = _pin_texts(pins)
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")

@@ -7,6 +7,7 @@ import difflib
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from assets.formats.errors import FormatError
 
@@ -22,12 +23,16 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of one clip; empty texts where nothing was said."""
+    """What is known of one clip; empty texts where nothing was said.
+
+    ``is_labelled`` is false where the label only stands in for one that was not said.
+    """
 
     label: str = ""
     style: str = ""
     subject: str = ""
     licence: str = ""
+    is_labelled: bool = True
 
 
 def is_clips_csv(name: str) -> bool:
@@ -74,7 +79,8 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
             file = (row.get(chosen["file"]) or "").strip().replace("\\", "/")
             if not file:
                 continue
-            said = Facts(**{k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"})
+            texts: dict[str, Any] = {k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"}
+            said = Facts(**texts)
             if facts.setdefault(file, said) != said:
                 raise FormatError(path, rows.line_num, f"want each file once, got {file!r} again with other facts")
     except csv.Error as error:
