@@ -267,6 +267,8 @@ def _row(clip: Clip, reading: dict[str, object]) -> dict[str, object]:
         "style": facts.style,
         "subject": facts.subject,
         "licence": facts.licence,
+        "performed_to": facts.performed_to,
+        "performed_offset_s": facts.performed_offset_s,
     }
 
 

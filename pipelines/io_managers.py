@@ -13,11 +13,11 @@ import dagster as dg
 import pyarrow as pa
 
 from assets import tables
-from assets.dance import Stage
 from assets.formats import audio, motion_index, tree, usd, usd_package
 from assets.lineage import Part, Parts, Stamp, content_version
 from assets.partitions import dagster_key, lake_key
 from assets.search import Index
+from assets.stage import Stage
 from pipelines.files import LakeError, why, write_beside
 from pipelines.freshness import Freshness
 from pipelines.lake import Lake
@@ -143,7 +143,7 @@ class IndexIOManager(LakeIOManager):
 
 
 class StageIOManager(LakeIOManager):
-    """Writes a :class:`~assets.dance.Stage` as USD under ``dances/``, with a row in the lake that names it."""
+    """Writes a :class:`~assets.stage.Stage` as USD under ``dances/``, with a row in the lake that names it."""
 
     def __init__(self, studio: StudioFolder, freshness: Freshness) -> None:
         super().__init__(studio.lake, freshness)
@@ -178,7 +178,12 @@ def write_dance(folder: Path, stage: Stage) -> list[Path]:
     sound, usdc, usdz = folder / "song.wav", folder / f"{stage.method}.usdc", folder / f"{stage.method}.usdz"
     audio.write_wav(sound, stage.sound)
     usd.write_stage(
-        usdc, stage.clip, audio=sound.name, provenance=stage.provenance, title=f"{stage.song_id}, {stage.method}"
+        usdc,
+        stage.clip,
+        audio=sound.name,
+        provenance=stage.provenance,
+        title=f"{stage.song_id}, {stage.method}",
+        lineage=stage.lineage,
     )
     usd_package.write_package(usdz, usdc)
     report = {
@@ -190,6 +195,7 @@ def write_dance(folder: Path, stage: Stage) -> list[Path]:
         "frame_rate_hz": stage.clip.frame_rate_hz,
         "quality": {name: measure["value"] for name, measure in stage.quality.items()},
         "wanted": {name: m for name, m in stage.quality.items() if m["wanted"]},
+        "licence": stage.provenance["licence"],
         "provenance": stage.provenance,
     }
     text = json.dumps(report, indent=2, sort_keys=True, ensure_ascii=False) + "\n"

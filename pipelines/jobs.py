@@ -20,7 +20,9 @@ rebuild_music = dg.define_asset_job(
     "rebuild_music", dg.AssetSelection.groups("music"), description="Read songs and find their beats."
 )
 rebuild_catalog = dg.define_asset_job(
-    "rebuild_catalog", dg.AssetSelection.groups("catalog"), description="Build the motion graph over all clips."
+    "rebuild_catalog",
+    dg.AssetSelection.groups("catalog"),
+    description="Build the motion graph and the model of the dancer over all clips.",
 )
 embed_motion = dg.define_asset_job(
     "embed_motion",

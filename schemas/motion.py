@@ -9,7 +9,7 @@ from schemas.table import Column, Table
 
 CLIP = Table(
     name="clip",
-    version=3,
+    version=4,
     meaning="One file of motion under clips/.",
     key=("clip_id", "path"),
     columns=(
@@ -25,6 +25,8 @@ CLIP = Table(
         f.STYLE,
         Column("subject", pa.string(), "Who was recorded, from clips.csv; empty when not said."),
         f.LICENCE,
+        Column("performed_to", pa.string(), "Song it was danced to, from clips.csv; empty when not said."),
+        Column("performed_offset_s", pa.float64(), "Time of that song at the first frame, from clips.csv; else 0."),
         f.STATE,
         f.REASON,
         Column("joint_count", pa.int32(), "Joints of the source rig; 0 when refused."),
