@@ -140,6 +140,9 @@ class MatchPathSettings(_Checked):
         "Price of a seam between poses beyond the thresholds; 0: as few of them as can be, before any cost counts.",
         least=0,
     )
+    other_starts: int = key(
+        4, "Other places of each matched clip that are tried too, where they match nearly as well.", least=0, most=50
+    )
     snap_loss_ratio: float = key(
         0.05,
         "A piece starts on a beat of its clip where that loses less than this share of its score.",

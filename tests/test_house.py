@@ -50,7 +50,6 @@ TESTED_ELSEWHERE = {
     "assets/declare.py",
     "assets/graph.py",
     "assets/matching.py",
-    "assets/sequence.py",
     "assets/motion.py",
     "assets/search.py",
     "assets/music.py",
