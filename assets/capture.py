@@ -264,6 +264,7 @@ def _row(clip: Clip, reading: dict[str, object]) -> dict[str, object]:
         "source_sha256": clip.sha256,
         "source_format": clip.kind if clip.sha256 else "",
         "label": facts.label,
+        "is_labelled": facts.is_labelled,
         "style": facts.style,
         "subject": facts.subject,
         "licence": facts.licence,

@@ -26,7 +26,7 @@ CLEAR_RATIO = 0.7
 states follow the dancer more closely, and cutting across no kinds they lose nothing."""
 
 MOST_DIMENSIONS = 24
-STARTS, TRIAL_STARTS, MOST_ROUNDS = 8, 3, 100
+STARTS, MOST_ROUNDS = 8, 100
 MOST_TRIED = 1500
 """Numbers of states are tried on so many motions, taken evenly from all."""
 
@@ -94,7 +94,7 @@ def cluster(vectors: Float, *, n_states: int = 0, seed: int = 0) -> States:
         else:
             sizes = [k for k in SIZES if k <= min(len(vectors) // FEWEST_EACH, n_different - 1)] or [1]
         some = low[:: max(-(-len(low) // MOST_TRIED), 1)]
-        tried = tuple((k, clearness(some, k_means(some, k, seed=seed, starts=TRIAL_STARTS), k)) for k in sizes)
+        tried = tuple((k, clearness(some, k_means(some, k, seed=seed), k)) for k in sizes)
         label = k_means(low, _chosen(tried), seed=seed)
     return _states(vectors, label, tried)
 
@@ -117,7 +117,7 @@ def _principal(vectors: Float) -> Float:
     return np.asarray(centred @ (kept * sign), np.float64)
 
 
-def k_means(points: Float, k: int, *, seed: int = 0, starts: int = STARTS) -> Int:
+def k_means(points: Float, k: int, *, seed: int = 0) -> Int:
     """Cluster points by Lloyd's algorithm from several k-means++ starts.
 
     Parameters
@@ -125,7 +125,6 @@ def k_means(points: Float, k: int, *, seed: int = 0, starts: int = STARTS) -> In
     points : (N, D) float, N >= k
     k : int, >= 1
     seed : int
-    starts : int, >= 1
 
     Returns
     -------
@@ -133,7 +132,7 @@ def k_means(points: Float, k: int, *, seed: int = 0, starts: int = STARTS) -> In
     """
     rng = np.random.default_rng(seed)
     best, least = np.zeros(len(points), np.int64), np.inf
-    for _ in range(starts if k > 1 else 1):
+    for _ in range(STARTS if k > 1 else 1):
         label, total = _lloyd(points, _plus_plus(points, k, rng))
         if total < least - 1e-12:
             best, least = label, total

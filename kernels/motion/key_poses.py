@@ -213,19 +213,22 @@ def pose_vectors(position_xyz_m: Float, root_wxyz: Float, frame_rate_hz: float, 
     Returns
     -------
     (N, 9 J) float64, metres
-        Joints at start, peak and end (nearest frames), seen from where the hips stand on the floor at the start and
-        turned so that they face +Z there: where the dancer is and faces does not count, how far the motion carries and
-        turns him does.
+        Joints at start, peak and end, between frames by lines, seen from where the hips stand on the floor at the
+        start and turned so that they face +Z there: where the dancer is and faces does not count, how far the motion
+        carries and turns him does.
     """
-    n_frames = len(position_xyz_m)
-    frame = [
-        np.clip(np.rint(at * frame_rate_hz).astype(np.int64), 0, n_frames - 1)
-        for at in (motions.start_s, motions.peak_s, motions.end_s)
-    ]
-    origin = position_xyz_m[frame[0], 0] * np.array([1.0, 0.0, 1.0])
-    facing = rotation.from_heading(-rotation.heading_rad(root_wxyz[frame[0]]))
-    poses = [rotation.apply(facing[:, None], position_xyz_m[f] - origin[:, None]) for f in frame]
-    return np.concatenate(poses, axis=1).reshape(len(frame[0]), 9 * position_xyz_m.shape[1])
+    last = len(position_xyz_m) - 1
+    moments = [np.clip(at * frame_rate_hz, 0, last) for at in (motions.start_s, motions.peak_s, motions.end_s)]
+    poses = []
+    for at in moments:
+        below = np.minimum(at.astype(np.int64), max(last - 1, 0))
+        share = (at - below)[:, None, None]
+        poses.append((1 - share) * position_xyz_m[below] + share * position_xyz_m[np.minimum(below + 1, last)])
+    origin = poses[0][:, 0] * np.array([1.0, 0.0, 1.0])
+    first = np.rint(moments[0]).astype(np.int64)
+    facing = rotation.from_heading(-rotation.heading_rad(root_wxyz[first]))
+    turned = [rotation.apply(facing[:, None], p - origin[:, None]) for p in poses]
+    return np.concatenate(turned, axis=1).reshape(len(first), 9 * position_xyz_m.shape[1])
 
 
 def to_poses(vector: Float) -> NDArray[np.float64]:
