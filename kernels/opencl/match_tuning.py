@@ -14,8 +14,8 @@ from kernels.opencl.match_program import Program
 from kernels.opencl.match_stages import Stages, wants_safe
 from kernels.opencl.match_tables import Tables
 
-_SEGMENTS = 32
-_CLIPS = 320
+_SEGMENTS = 128
+_CLIPS = 80
 _SPARSE = 0.5
 _TURNS = 3
 _HOPELESS = 1.5  # times the least so far: no further turn
