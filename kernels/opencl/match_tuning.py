@@ -67,7 +67,8 @@ def pick_plan(
     Returns
     -------
     Plan
-        The fastest, or one with less memory that is within a twentieth of it. Only the time of a search depends on it, never the answer.
+        The fastest, or one with less memory that is within a twentieth of it. Only the time of a search depends on
+        it, never the answer.
     """
     plans = worth_trying(segments, n_frames)
     some = np.unique(np.linspace(0, len(segments) - 1, _SEGMENTS).astype(int))
@@ -76,7 +77,8 @@ def pick_plan(
     is_safe = any(wants_safe(tables, float(segments[i].max())) is not False for i in some)
     k_sample = max(round(k * len(few) / len(clips)), 1)
     floor = np.full(len(some), -1, np.float32)
-    tried, warm = [], []
+    tried: list[Stages] = []
+    warm: list[Stages] = []
     for plan in plans:
         tables.build(plan)
         for stages, chosen in ((tried, some), (warm, some[:2])):
