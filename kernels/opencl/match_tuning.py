@@ -81,8 +81,8 @@ def pick_plan(
     warm: list[Stages] = []
     for plan in plans:
         tables.build(plan)
-        for stages, chosen in ((tried, some), (warm, some[:2])):
-            stages.append(
+        for made, chosen in ((tried, some), (warm, some[:2])):
+            made.append(
                 Stages(
                     tables, segments[chosen], n_frames=n_frames[chosen], plan=plan, is_safe=is_safe, by_level=by_level
                 )
