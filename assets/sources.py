@@ -9,7 +9,8 @@ import json
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -17,6 +18,7 @@ from assets.formats import clips_csv, settings, suit, tree
 from assets.formats.clips_csv import Facts
 from assets.formats.errors import FormatError
 from assets.formats.tree import File, HashCache
+from assets.performances import Danced, Music, pair
 from schemas.keys import clip_key, part_key, part_of, parts_in_use, session_key, song_key
 from schemas.settings import Brief, Settings
 
@@ -98,6 +100,19 @@ class Sources:
             found[song.key].append(song)
         return {key: tuple(found[key]) for key in sorted(found)}
 
+    @cached_property
+    def performed_songs(self) -> frozenset[str]:
+        """Keys of the songs that clips were danced to."""
+        found, _ = pair(
+            [
+                Danced(c.key, c.path, c.facts.performed_to, c.facts.performed_offset_s)
+                for c in self.clips
+                if not c.problem
+            ],
+            [Music(s.key, s.path, s.kind) for s in self.songs if not s.problem],
+        )
+        return frozenset(one.song_id for one in found)
+
 
 @dataclass(frozen=True)
 class Request:
@@ -107,10 +122,14 @@ class Request:
     ----------
     frame_rate_hz : frames a second of the stage; 0 for the setting
     pins : as on the command line; beside those of the brief
+    temperature : of a dance by the model; None for the setting
+    seed : of what is drawn at random
     """
 
     frame_rate_hz: float = 0.0
     pins: tuple[str, ...] = ()
+    temperature: float | None = None
+    seed: int = 0
 
 
 class Studio(Protocol):
@@ -144,9 +163,7 @@ def fingerprint(facts: object) -> str:
 
 def session_version(clips: Iterable[Clip]) -> str:
     """Version of a session's sources: which files, with which bytes, labelled how."""
-    return fingerprint(
-        [[c.path, c.sha256, c.facts.label, c.facts.style, c.facts.subject, c.facts.licence, c.problem] for c in clips]
-    )
+    return fingerprint([[c.path, c.sha256, asdict(c.facts), c.problem] for c in clips])
 
 
 def song_version(songs: Iterable[Song]) -> str:
@@ -182,7 +199,7 @@ def _clips(
 ) -> list[Clip]:
     root = studio / "clips"
     files = tree.walk(root, notes)
-    facts = _facts(root, [f for f in files if clips_csv.is_clips_csv(f.name)], notes)
+    said = _said(root, [f for f in files if clips_csv.is_clips_csv(f.name)], notes)
     sources = [f for f in files if _is_motion(root, f, notes)]
     by_folder: dict[tuple[str, ...], list[File]] = defaultdict(list)
     for file in sources:
@@ -200,8 +217,29 @@ def _clips(
             digest, problem = ("", problem) if problem else _hashed(root, file, cache, now_ns)
             if not problem and taken.setdefault(key, path) != path:
                 problem = f"want its own key, got {key!r}, which {taken[key]} has; rename one of the two files"
-            clips.append(Clip(key, session, path, "" if problem else digest, _facts_of(facts, file), problem))
+            clips.append(Clip(key, session, path, "" if problem else digest, _facts_of(said, file), problem))
+    notes.extend(note for table in said if (note := table.note()))
     return clips
+
+
+@dataclass(frozen=True)
+class _Said:
+    """What one ``clips.csv`` says, and which of its rows spoke of a file so far."""
+
+    path: str
+    folders: tuple[str, ...]
+    facts: dict[str, Facts]
+    used: set[str] = field(default_factory=set)
+
+    def note(self) -> str:
+        """Name the rows that speak of no file; empty when all do."""
+        idle = sorted(self.facts.keys() - self.used)
+        if not idle:
+            return ""
+        return (
+            f"clips/{self.path}: {len(idle)} of {len(self.facts)} rows speak of no file here, such as {idle[0]!r}; "
+            "a row names a file with its suffix, below the folder of the table"
+        )
 
 
 def _is_motion(root: Path, file: File, notes: list[str]) -> bool:
@@ -228,25 +266,32 @@ def _n_parts(n_files: int, in_use: int) -> int:
     return n_parts
 
 
-def _facts(root: Path, files: Iterable[File], notes: list[str]) -> list[tuple[tuple[str, ...], dict[str, Facts]]]:
+def _said(root: Path, files: Iterable[File], notes: list[str]) -> list[_Said]:
     """Read the ``clips.csv`` files, the nearest folder's first."""
     said = []
     for file in files:
+        path = f"clips/{file.path}"
         try:
-            said.append((file.folders, clips_csv.parse((root / file.path).read_bytes(), f"clips/{file.path}")))
+            data = (root / file.path).read_bytes()
+            said.append(_Said(file.path, file.folders, clips_csv.parse(data, path)))
         except (FormatError, OSError) as error:
             notes.append(f"{error}; its labels are left out")
-    return sorted(said, key=lambda entry: -len(entry[0]))
+            continue
+        for name, meant in clips_csv.misspelt_columns(data).items():
+            notes.append(f"{path}: column {name!r} is not read; if {meant!r} was meant, name it so")
+    return sorted(said, key=lambda table: -len(table.folders))
 
 
-def _facts_of(said: Iterable[tuple[tuple[str, ...], dict[str, Facts]]], file: File) -> Facts:
+def _facts_of(said: Iterable[_Said], file: File) -> Facts:
     fallback = file.folders[-1] if file.folders else "clips"
-    for folders, facts in said:
-        if file.folders[: len(folders)] == folders:
-            found = clips_csv.look_up(facts, file.folders, file.name)
-            if found is not None:
-                return found if found.label else replace(found, label=fallback)
-    return Facts(label=fallback)
+    for table in said:
+        if file.folders[: len(table.folders)] == table.folders:
+            row = clips_csv.row_of(table.facts, file.folders, file.name)
+            if row is not None:
+                table.used.add(row)
+                found = table.facts[row]
+                return found if found.label else replace(found, label=fallback, is_labelled=False)
+    return Facts(label=fallback, is_labelled=False)
 
 
 def _hashed(root: Path, file: File, cache: HashCache, now_ns: int) -> tuple[str, str]:

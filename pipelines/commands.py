@@ -1,38 +1,33 @@
 """What the command does: the report for a person, the facts for a machine, the exit status."""
 
 import difflib
-import json
-import shutil
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import polars as pl
 from sqlalchemy.exc import DBAPIError
 
-from assets.formats import usd_package
 from assets.formats.errors import FormatError
-from assets.lineage import Progress, content_version
+from assets.lineage import Progress
 from assets.motion import beat_settings
-from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES
+from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES, base_method
 from assets.sources import Request, Song
 from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
+from pipelines import dancing, proposing
+from pipelines import why as explaining
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.files import StudioError, write_beside
-from pipelines.freshness import Finding, Freshness
+from pipelines.files import LakeError, StudioError
+from pipelines.freshness import Freshness
 from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
 from pipelines.resources import StudioFolder
+from pipelines.status import any_read, clips_of, counts, refusals, songs_of
 from pipelines.web import existing
-from schemas.motion import CANONICAL_POSE
-from schemas.music import SONG
 from schemas.pins import parse_pin
 
-LONGEST_LIST = 40
 
-
-class _Session:
+class Session:
     """A studio opened for work: held, tidied, its definitions loaded."""
 
     def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
@@ -92,26 +87,26 @@ def check_settings(studio: StudioFolder) -> None:
 def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
     """Bring a studio up to date."""
     studio = existing(root)
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     sources = work.state.sources
     if not sources.clips and not sources.songs:
         raise StudioError(f"{root}: want clips under clips/ and songs under songs/, got none; put some there")
     groups = building.GROUPS if dances else [g for g in building.GROUPS if g != "dance"]
     report = work.run(groups)
-    clips, songs = _clips(work.state, studio), _songs(work.state, studio)
+    clips, songs = clips_of(work.state, studio), songs_of(work.state, studio)
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
     facts = {
-        "clips": _counts(clips),
-        "songs": _counts(songs),
+        "clips": counts(clips),
+        "songs": counts(songs),
         "refused": [{"path": f["path"], "reason": f["reason"]} for f in refused],
         "ran": [{"assets": list(b.assets), "partitions": list(b.keys)} for b in report.ran],
         "failed": report.failed,
         "notes": list(sources.notes),
     }
-    troubles = [*_refusals(refused), *(f"failed: {f}" for f in report.failed), *(f"note: {n}" for n in sources.notes)]
+    troubles = [*refusals(refused), *(f"failed: {f}" for f in report.failed), *(f"note: {n}" for n in sources.notes)]
     status = (
         NOTHING_DONE
-        if report.failed and not _any_read(clips, songs)
+        if report.failed and not any_read(clips, songs)
         else SOME_REFUSED
         if refused or report.failed
         else DONE
@@ -140,17 +135,19 @@ def dance(
     progress: Callable[[], Any],
     pins: Sequence[str] = (),
     alternatives: int = 1,
+    temperature: float | None = None,
+    seed: int = 0,
 ) -> Outcome:
     """Dance songs, building first what they need and nothing else; by their briefs' methods where none is given."""
     studio = existing(root)
     if method is not None and method not in METHODS:
         raise StudioError(f"--method: want one of {', '.join(METHODS)}, got {method!r}")
     if out is not None:
-        _check_out(out)
+        dancing.check_out(out)
     pins = _pin_texts(pins)
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
@@ -158,15 +155,17 @@ def dance(
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
     before = studio.requests()
     for key in sorted(keys):
-        studio.remember(key, Request(frame_rate_hz or 0.0, pins))
+        studio.remember(key, Request(frame_rate_hz or 0.0, pins, temperature, seed))
     names = {song.key for song in songs}
+    if any(base_method(chosen) == "hmm" for ways in methods.values() for chosen in ways):
+        names |= work.state.sources.performed_songs  # what the dancer danced to is what the model learns from
     report = work.run(
         building.GROUPS,
         keys=lambda kind, key: key in keys if kind == "dance" else key in names if kind == "song" else True,
         assets=set().union(*(work.state.needed_for(key) for key in keys)),
     )
     state = freshness(studio)
-    refused = {f["key"]: f["reason"] for f in _songs(state, studio) if f["state"] == "refused"}
+    refused = {f["key"]: f["reason"] for f in songs_of(state, studio) if f["state"] == "refused"}
     made, troubles = [], []
     for song, way in [(one, way) for one in songs for way in methods[one.key]]:
         key = f"{song.key}|{way}"
@@ -176,14 +175,38 @@ def dance(
             troubles += [f"failed: {f}" for f in report.failed] or [f"failed: {song.path}"]
             studio.remember(key, before.get(key))  # what cannot be is not asked for again every night
         else:
-            made.append(_dance_facts(studio, song.key, way))
+            made.append(dancing.facts_of(studio, song.key, way))
     if out is not None and made:
-        _copy(made[0], out)
+        dancing.copy_out(made[0], out)
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
-    facts = _dance_json(made, troubles, len(keys))
+    facts = dancing.dances_facts(made, troubles, len(keys))
     if not made:
         facts |= next((dict(t.facts) for t in report.troubles if "conflict" in t.facts), {})
-    return Outcome(status, facts, "\n".join(_dance_report(d) for d in made), list(dict.fromkeys(troubles)))
+    return Outcome(status, facts, "\n".join(dancing.report_of(d) for d in made), list(dict.fromkeys(troubles)))
+
+
+def propose(
+    root: Path,
+    wanted: str,
+    place: str,
+    *,
+    pins: Sequence[str] = (),
+    progress: Callable[[], Any],
+) -> Outcome:
+    """List what could be pinned at a place of a song, building first what that takes; nothing is danced."""
+    studio = existing(root)
+    pins = _pin_texts(pins)
+    work = Session(studio, progress)
+    songs = _wanted(work.state, [wanted], studio)
+    if len(songs) > 1:
+        raise StudioError(f"--propose: want one song, got {len(songs)}")
+    key = f"{songs[0].key}|{METHODS[0]}"
+    needed = {name for name in work.state.needed_for(key) if work.state.assets[name].kind != "dance"}
+    report = work.run(building.GROUPS, keys=lambda kind, one: kind != "song" or one == songs[0].key, assets=needed)
+    try:
+        return proposing.propose(studio, songs[0].key, place, pins)
+    except LakeError as error:
+        raise StudioError("; ".join([str(error), *report.failed])) from error
 
 
 def _pin_texts(pins: Sequence[str]) -> tuple[str, ...]:
@@ -207,93 +230,6 @@ def _briefed_method(studio: StudioFolder, song: Song) -> str:
         return studio.brief(song).method
     except FormatError:
         return METHODS[0]
-
-
-def _dance_json(made: list[dict[str, Any]], troubles: list[str], n_asked: int) -> dict[str, Any]:
-    if n_asked == 1:
-        return made[0] if made else {"error": "; ".join(dict.fromkeys(troubles))}
-    return {"dances": made, "troubles": list(dict.fromkeys(troubles))}
-
-
-def _dance_facts(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
-    folder = studio.dances / song
-    report = json.loads((folder / f"{method}.json").read_text())
-    return {
-        "song": song,
-        "method": method,
-        "stage": str(folder / f"{method}.usdc"),
-        "usdz": str(folder / f"{method}.usdz"),
-        "quality": report["quality"],
-        "not_as_wanted": sorted(n for n, m in report["wanted"].items() if m["is_passed"] is False),
-        "pins": _pin_facts(studio, f"{song}|{method}"),
-    }
-
-
-def _pin_facts(studio: StudioFolder, key: str) -> list[dict[str, Any]]:
-    """Tell for each pin when it is danced, by which clips, and whether it is kept."""
-    steps = pl.DataFrame(studio.lake.table("choreography", key)).filter(pl.col("pin_id").is_not_null())
-    if not len(steps):
-        return []
-    sessions = studio.lake.keys("clip")
-    clips = {r["clip_id"]: r for s in sessions for r in studio.lake.table("clip", s).to_pylist()}
-    facts = []
-    for pin, rows in steps.group_by("pin_id", maintain_order=True):
-        danced = list(dict.fromkeys(rows["clip_id"].to_list()))
-        facts.append(
-            {
-                "pin": pin[0],
-                "from_s": rows["song_start_s"].min(),
-                "to_s": rows["song_end_s"].max(),
-                "clips": danced,
-                "is_kept": all(parse_pin(str(pin[0])).is_kept_by(**_named(clips[clip])) for clip in danced),
-            }
-        )
-    return facts
-
-
-def _named(clip: Mapping[str, Any]) -> dict[str, str]:
-    return {"clip_id": str(clip["clip_id"]), "label": str(clip["label"]), "style": str(clip["style"])}
-
-
-def _dance_report(facts: dict[str, Any]) -> str:
-    q = facts["quality"]
-    lines = [
-        f"{facts['song']}: {facts['usdz']}",
-        f"  {q['clip_count']:.0f} clips, {q['seam_count']:.0f} seams; beats at most {q['beat_lag_ms']:.1f} ms off; "
-        f"warp {q['warp_least_ratio']:.2f} to {q['warp_most_ratio']:.2f}",
-        f"  on the beat to an independent eye: F {q['beat_f_ratio']:.2f}, p {q['beat_p_probability']:.3f}",
-    ]
-    lines += [
-        f"  pin {p['pin']}: {'kept' if p['is_kept'] else 'not kept'}, {', '.join(p['clips'])} "
-        f"from {p['from_s']:.2f} to {p['to_s']:.2f} s"
-        for p in facts["pins"]
-    ]
-    if facts["not_as_wanted"]:
-        lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")
-    return "\n".join(lines)
-
-
-def _check_out(out: Path) -> None:
-    """Refuse to copy to where a file of the user would be lost."""
-    if out.suffix not in (".usdz", ".usdc"):
-        raise StudioError(f"--out: want a file ending in .usdz or .usdc, got {out.name!r}")
-    sound = out.with_suffix(".wav")
-    if out.suffix == ".usdc" and sound.exists() and usd_package.song_name(out) != sound.name:
-        raise StudioError(
-            f"--out: want room for the song beside the stage, got another file {sound}; move it, or name another stage"
-        )
-
-
-def _copy(facts: dict[str, Any], out: Path) -> None:
-    source = Path(facts["usdz" if out.suffix == ".usdz" else "stage"])
-    facts["out"] = str(out)
-    if out.resolve() == source.resolve():
-        return
-    if out.suffix == ".usdc":
-        usd_package.copy_stage(out, source)
-    else:
-        with source.open("rb") as original:
-            write_beside(out, lambda file: shutil.copyfileobj(original, file))
 
 
 def _wanted(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[Song]:
@@ -330,6 +266,18 @@ def _same(studio: StudioFolder, song: Song, text: str) -> bool:
     return Path(text).absolute() == studio.file(song.path)
 
 
+def why(root: Path, danced: str, *, at_s: float | None) -> Outcome:
+    """Say where a moment of a dance comes from, or where all of it does; a stage answers without a studio."""
+    if danced.lower().endswith(explaining.STAGE_SUFFIXES):
+        return explaining.why(explaining.from_stage(Path(danced)), at_s)
+    studio = existing(root)
+    state = freshness(studio)
+    text, bar, method = danced.partition("|")
+    song = _wanted(state, [text], studio)[0]
+    key = explaining.find_dance(studio, f"{song.key}{bar}{method}", _briefed_method(studio, song))
+    return explaining.why(explaining.from_lake(studio, key), at_s)
+
+
 def check(file: Path) -> Outcome:
     """Validate a stage."""
     from assets.formats import usd_check
@@ -348,129 +296,3 @@ def check(file: Path) -> Outcome:
     lines = [f"{f.severity}: {f.rule}: {f.prim_path}: {f.sentence}" for f in findings]
     verdict = f"{file}: {'valid' if not errors else f'{len(errors)} errors'}"
     return Outcome(SOME_REFUSED if errors else DONE, facts, "\n".join([*lines, verdict]))
-
-
-def status(root: Path) -> Outcome:
-    """Say what is fresh, stale, failed or refused."""
-    studio = existing(root)
-    state = freshness(studio)
-    (clips, doubts), songs = _clips_and_doubts(state, studio), _songs(state, studio)
-    failures = building.last_failures(building.open_instance(studio)) if studio.dagster_home.is_dir() else {}
-    assets = [_asset_facts(f, state, failures) for f in state.findings()]
-    refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
-    notes = list(state.sources.notes)
-    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes, "warnings": doubts}
-    report = _status_report(studio, clips, songs, assets, refused, notes, doubts)
-    return Outcome(SOME_REFUSED if refused else DONE, facts, report)
-
-
-def _asset_facts(finding: Finding, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:
-    failure = failures.get((finding.asset, finding.key)) if finding.state in ("stale", "missing") else None
-    return {
-        "asset": finding.asset,
-        "partition": finding.key,
-        "group": state.assets[finding.asset].group,
-        "state": "failed" if failure else finding.state,
-        "why": failure or finding.why,
-    }
-
-
-def _status_report(
-    studio: StudioFolder,
-    clips: list[dict[str, Any]],
-    songs: list[dict[str, Any]],
-    assets: list[dict[str, Any]],
-    refused: list[dict[str, Any]],
-    notes: list[str],
-    doubts: list[dict[str, str]],
-) -> str:
-    lines = [f"studio {studio.root}"]
-    for name, files in (("clips", clips), ("songs", songs)):
-        counts = _counts(files)
-        lines.append(
-            f"  {name}: " + ", ".join(f"{n} {state}" for state, n in counts.items() if n) + ("" if files else "none")
-        )
-    unfresh = [a for a in assets if a["state"] != "fresh"]
-    lines.append(f"  assets: {len(assets) - len(unfresh)} partitions fresh, {len(unfresh)} not")
-    lines += [f"    {a['state']}: {a['asset']}[{a['partition']}]: {a['why']}" for a in unfresh[:LONGEST_LIST]]
-    lines += _more(unfresh)
-    lines += [f"  {line}" for line in _refusals(refused)]
-    doubtful = [f"  warning: {doubt['path']}: {doubt['warning']}" for doubt in doubts]
-    lines += doubtful[:LONGEST_LIST] + _more(doubtful)
-    lines += [f"  note: {note}" for note in notes]
-    return "\n".join(lines)
-
-
-def _clips(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
-    """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
-    return _clips_and_doubts(state, studio)[0]
-
-
-def _clips_and_doubts(state: Freshness, studio: StudioFolder) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
-    """List the motion files, and what is doubtful about those that were read."""
-    stored = {}
-    for session in studio.lake.keys("clip"):
-        if studio.lake.stamp("clip", session) is None:  # of an older version: as if it were not there
-            continue
-        for row in studio.lake.table("clip", session).to_pylist():
-            stored[row["path"]] = row
-    unplaced = {session: _unplaced(state, session) for session in studio.lake.keys("canonical_pose")}
-    found: list[dict[str, Any]] = []
-    doubts: list[dict[str, str]] = []
-    for clip in state.sources.clips:
-        path = clip.path.encode("utf-8", "backslashreplace").decode()
-        row = stored.get(path)
-        seen = _seen(row, clip.sha256, clip.problem)
-        if seen["state"] == "read" and clip.key in unplaced.get(clip.session, ()):
-            seen = {"state": "refused", "reason": "its motion could not be brought to the canonical skeleton"}
-        warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
-        found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
-        doubts += [{"path": path, "warning": sentence} for sentence in warnings]
-    return found, doubts
-
-
-def _unplaced(state: Freshness, session: str) -> set[str]:
-    """Clips of a session that were read and have no canonical pose."""
-    stamp = state.stamp("canonical_pose", session)
-    return {clip for clip, made in stamp.clips.items() if made.content == _NO_POSE} if stamp else set()
-
-
-_NO_POSE = content_version(CANONICAL_POSE.empty())
-
-
-def _songs(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
-    stored = {}
-    for key in studio.lake.keys(SONG.name):
-        for row in studio.lake.table(SONG.name, key).to_pylist():
-            stored[row["path"]] = row
-    found = []
-    for song in state.sources.songs:
-        path = song.path.encode("utf-8", "backslashreplace").decode()
-        found.append({"path": path, "key": song.key, **_seen(stored.get(path), song.sha256, song.problem)})
-    return found
-
-
-def _seen(row: dict[str, Any] | None, sha256: str, problem: str) -> dict[str, Any]:
-    if problem:
-        return {"state": "refused", "reason": problem}
-    if row is None:
-        return {"state": "new", "reason": None}
-    if row["source_sha256"] != sha256:
-        return {"state": "changed", "reason": None}
-    return {"state": row["state"], "reason": row["reason"]}
-
-
-def _counts(files: list[dict[str, Any]]) -> dict[str, int]:
-    return {state: sum(f["state"] == state for f in files) for state in ("read", "refused", "new", "changed")}
-
-
-def _any_read(*lists: list[dict[str, Any]]) -> bool:
-    return any(f["state"] == "read" for files in lists for f in files)
-
-
-def _refusals(refused: list[dict[str, Any]]) -> list[str]:
-    return [f"refused: {f['path']}: {f['reason']}" for f in refused]
-
-
-def _more(items: Sequence[object]) -> list[str]:
-    return [f"    … and {len(items) - LONGEST_LIST} more"] if len(items) > LONGEST_LIST else []

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from assets.formats.errors import FormatError
 
@@ -16,17 +19,27 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "style": ("style", "kind"),
     "subject": ("subject", "person", "performer", "actor"),
     "licence": ("licence", "license"),
+    "performed_to": ("performed_to",),
+    "performed_offset_s": ("performed_offset_s", "offset_s"),
 }
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of one clip; empty texts where nothing was said."""
+    """What is known of one clip; empty texts where nothing was said.
+
+    ``is_labelled`` is false where the label only stands in for one that was not said.
+    ``performed_to`` is the song it was danced to (key, file name or stem; ``none`` for no song of the studio),
+    ``performed_offset_s`` the time of the song at the clip's first frame.
+    """
 
     label: str = ""
     style: str = ""
     subject: str = ""
     licence: str = ""
+    performed_to: str = ""
+    performed_offset_s: float = 0.0
+    is_labelled: bool = True
 
 
 def is_clips_csv(name: str) -> bool:
@@ -53,7 +66,7 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
     Raises
     ------
     FormatError
-        If it is not UTF-8, has no file column, or names a file twice with different facts.
+        If it is not UTF-8, has no file column, names a file twice with different facts, or an offset is no number.
     """
     try:
         text = data.decode("utf-8-sig")
@@ -73,7 +86,9 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
             file = (row.get(chosen["file"]) or "").strip().replace("\\", "/")
             if not file:
                 continue
-            said = Facts(**{k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"})
+            texts: dict[str, Any] = {k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"}
+            offset_s = _seconds(texts.pop("performed_offset_s", ""), path, rows.line_num)
+            said = Facts(**texts, performed_offset_s=offset_s)
             if facts.setdefault(file, said) != said:
                 raise FormatError(path, rows.line_num, f"want each file once, got {file!r} again with other facts")
     except csv.Error as error:
@@ -81,8 +96,30 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
     return facts
 
 
-def look_up(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> Facts | None:
-    """Find what a ``clips.csv`` says of a file.
+def _seconds(text: str, path: str, line: int) -> float:
+    try:
+        value = float(text or 0.0)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise FormatError(path, line, f"want performed_offset_s in seconds, got {text!r}; write a number such as 1.25")
+    return value
+
+
+def misspelt_columns(data: bytes) -> dict[str, str]:
+    """Name the columns nobody reads that are nearly one we read, which goes unnamed, and that one.
+
+    Other columns are a data set's own business. Empty for what is no table.
+    """
+    header = next(csv.reader(io.StringIO(data.decode("utf-8-sig", errors="replace"), newline="")), [])
+    names = [name.strip().lower() for name in header]
+    wanted = [ours[0] for ours in COLUMNS.values() if not set(ours) & set(names)]
+    found = {name: difflib.get_close_matches(name, wanted, n=1, cutoff=0.75) for name in names if name}
+    return {name: near[0] for name, near in found.items() if near}
+
+
+def row_of(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> str | None:
+    """Find the row of a ``clips.csv`` that speaks of a file.
 
     Rows may name the file alone or with some of its folders: the longest row that the file's path ends with counts.
 
@@ -93,14 +130,14 @@ def look_up(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> Fa
 
     Returns
     -------
-    Facts or None
-        None when no row names it.
+    str or None
+        The file as the row writes it; None when no row names it.
     """
     parts = [*folders, name]
     for start in range(len(parts)):
-        found = facts.get("/".join(parts[start:]))
-        if found is not None:
-            return found
+        ending = "/".join(parts[start:])
+        if ending in facts:
+            return ending
     # A row may also carry folders the studio does not have: data sets list their files from their own root.
     endings = [key for key in facts if key.rsplit("/", 1)[-1] == name]
-    return facts[endings[0]] if len(endings) == 1 else None
+    return endings[0] if len(endings) == 1 else None

@@ -58,17 +58,17 @@ def walk(root: Path, notes: list[str] | None = None) -> list[File]:
     Parameters
     ----------
     root : folder; a missing one lists nothing
-    notes : takes a sentence for each folder that cannot be listed
+    notes : takes a sentence for each folder that cannot be listed and each link that leads nowhere
 
     Returns
     -------
     list of File
         Sorted by path.
     """
-    return sorted(_walk(root, "", frozenset(), [] if notes is None else notes), key=lambda f: f.path)
+    return sorted(_walk(root, root, "", frozenset(), [] if notes is None else notes), key=lambda f: f.path)
 
 
-def _walk(folder: Path, prefix: str, seen: frozenset[tuple[int, int]], notes: list[str]) -> Iterator[File]:
+def _walk(root: Path, folder: Path, prefix: str, seen: frozenset[tuple[int, int]], notes: list[str]) -> Iterator[File]:
     try:
         here = folder.stat()
         entries = list(os.scandir(folder))
@@ -76,7 +76,7 @@ def _walk(folder: Path, prefix: str, seen: frozenset[tuple[int, int]], notes: li
         return
     except OSError as error:
         notes.append(
-            f"{folder.name}: cannot be listed: {error.strerror or error}; see to the folder and its permissions"
+            f"{root.name}/{prefix}: cannot be listed: {error.strerror or error}; see to the folder and its permissions"
         )
         return
     identity = (here.st_dev, here.st_ino)
@@ -87,13 +87,16 @@ def _walk(folder: Path, prefix: str, seen: frozenset[tuple[int, int]], notes: li
             continue
         try:
             if entry.is_dir():
-                yield from _walk(Path(entry.path), f"{prefix}{entry.name}/", seen | {identity}, notes)
+                yield from _walk(root, Path(entry.path), f"{prefix}{entry.name}/", seen | {identity}, notes)
             else:
                 status = entry.stat()
                 if stat.S_ISREG(status.st_mode):
                     yield File(f"{prefix}{entry.name}", status.st_size, status.st_mtime_ns)
-        except OSError:  # a dangling link, a link to itself, or gone since it was listed
-            continue
+        except OSError as error:
+            if entry.is_symlink():
+                what = f"is a link that leads nowhere: {error.strerror or error}"
+                notes.append(f"{root.name}/{prefix}{entry.name}: {what}; mend or remove it")
+            # else gone since it was listed
 
 
 def sha256(path: Path) -> str:

@@ -100,6 +100,19 @@ def test_broken_table_is_a_note(studio):
     assert found.clips[0].facts.label == "s"
 
 
+def test_rows_for_no_file_and_columns_misspelt_are_notes(studio):
+    column, rows = look(studio({"clips/clips.csv": b"file,lable\nlost.bvh,a\ngone.bvh,b\n"})).notes
+    assert "column 'lable' is not read; if 'label' was meant" in column
+    assert "clips/clips.csv: 2 of 2 rows speak of no file here, such as 'gone.bvh'" in rows
+
+
+def test_a_link_that_leads_nowhere_is_a_note(studio):
+    root = studio({"clips/one.bvh": b"1"})
+    (root / "clips" / "kept_elsewhere.bvh").symlink_to(root / "nowhere.bvh")
+    (note,) = look(root).notes
+    assert note.startswith("clips/kept_elsewhere.bvh: is a link that leads nowhere: No such file")
+
+
 def test_too_large_is_refused_unread(studio):
     root = studio({"clips/s/a.bvh": b"1" * 2000})
     found = look(root, settings=Settings(limits=Limits(largest_clip_mb=0.001)))

@@ -139,30 +139,6 @@ def test_json_is_one_object_and_may_stand_last(built):
     assert facts["pins"] == []
 
 
-def test_status_says_every_file_and_asset(built):
-    done = odori("status", "--json", env={"ODORI_STUDIO": str(built), "PATH": "/usr/bin:/bin"})
-    assert done.returncode == 0
-    facts = json.loads(done.stdout)
-    assert {c["path"] for c in facts["clips"]} == {str(p.relative_to(built)) for p in built.rglob("*.bvh")}
-    assert set(facts["clips"][0]) == {"path", "key", "session", "state", "reason"}
-    assert set(facts["songs"][0]) == {"path", "key", "state", "reason"}
-    assert {a["state"] for a in facts["assets"]} == {"fresh"}
-    assert facts["clips"][0]["reason"] is None
-
-
-def test_status_before_the_first_build(fresh_studio):
-    found = commands.status(fresh_studio)
-    assert {c["state"] for c in found.facts["clips"]} == {"new"}
-    assert "missing" in found.report
-
-
-def test_status_after_a_change(studio):
-    (studio / "clips" / "ayame" / "step.bvh").write_bytes((studio / "clips" / "ayame" / "wave.bvh").read_bytes())
-    found = commands.status(studio)
-    assert {c["state"] for c in found.facts["clips"] if "step" in c["path"]} == {"changed"}
-    assert "stale: clip[ayame]: sources changed" in found.report
-
-
 def test_check_of_a_good_a_damaged_and_a_missing_stage(built, tmp_path):
     good = built / "dances" / "beat" / "graph.usdz"
     assert odori("check", good).returncode == 0

@@ -9,6 +9,7 @@ import pytest
 from pipelines import commands
 from pipelines.files import StudioError
 from pipelines.resources import NoProgress
+from pipelines.status import status
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ def test_conflicts_name_the_pins_and_ways_out(studio, dance):
     both = dance(pins=["3=kick", "3=step"])
     assert both.status == 2
     assert both.facts["conflict"] == ["3=kick", "3=step"]
-    assert commands.status(studio).status == 0
+    assert status(studio).status == 0
     assert dance().status == 0
 
 

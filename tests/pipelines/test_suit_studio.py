@@ -17,6 +17,7 @@ from kernels.synthetic.suit import Disturbance, made_up, make_body, record
 from pipelines import commands
 from pipelines.collection import freshness
 from pipelines.resources import NoProgress, StudioFolder
+from pipelines.status import status
 
 NOISE = Disturbance(0.001, 0.01, 0.002, 0.003, 0.003)
 
@@ -102,11 +103,11 @@ def _facing(place, hips):
 def test_everything_is_fresh_and_status_says_what_is_doubtful(built_suit):
     root, _ = built_suit
     assert all(f.state == "fresh" for f in freshness(StudioFolder(root)).findings())
-    status = commands.status(root)
-    said = [(doubt["path"], doubt["warning"]) for doubt in status.facts["warnings"]]
+    found = status(root)
+    said = [(doubt["path"], doubt["warning"]) for doubt in found.facts["warnings"]]
     assert said == [("clips/suit/medley.parquet", warning) for warning in rows(root)["medley.parquet"]["warnings"]]
-    assert all(f"warning: {path}: {warning}" in status.report for path, warning in said)
-    assert "refused: clips/suit/frozen.csv: " in status.report
+    assert all(f"warning: {path}: {warning}" in found.report for path, warning in said)
+    assert "refused: clips/suit/frozen.csv: " in found.report
 
 
 def test_a_changed_setting_calibrates_again_and_leaves_bvh_alone(studio):

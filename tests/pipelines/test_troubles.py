@@ -15,6 +15,7 @@ from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
 from pipelines.files import LakeError, StudioError
 from pipelines.resources import NoProgress, StudioFolder
+from pipelines.status import status
 
 
 def states(root):
@@ -61,7 +62,7 @@ def test_one_failing_session_stops_no_other(fresh_studio, build, failing_session
     assert state.state("motion_beat", "ayame").state == "fresh"
     assert state.state("music_beat", "beat").state == "fresh"
     assert pq.read_table(fresh_studio / "lake" / "motion_graph_node" / "all.parquet").num_rows > 0
-    failed = [a for a in commands.status(fresh_studio).facts["assets"] if a["state"] == "failed"]
+    failed = [a for a in status(fresh_studio).facts["assets"] if a["state"] == "failed"]
     assert ("motion_beat", "kaede") in {(a["asset"], a["partition"]) for a in failed}
     assert any("the plotter broke" in a["why"] for a in failed)
     danced = commands.dance(fresh_studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
@@ -162,6 +163,6 @@ def test_the_tracker_that_was_asked_for_is_used(studio, build):
 
 
 def test_status_tells_machines_what_failed(studio):
-    facts = commands.status(studio).facts
+    facts = status(studio).facts
     assert json.loads(json.dumps(facts)) == facts
     assert {a["state"] for a in facts["assets"]} == {"fresh"}

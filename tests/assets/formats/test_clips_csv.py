@@ -2,7 +2,7 @@
 
 import pytest
 
-from assets.formats.clips_csv import Facts, is_clips_csv, look_up, parse
+from assets.formats.clips_csv import Facts, is_clips_csv, misspelt_columns, parse, row_of
 from assets.formats.errors import FormatError
 
 
@@ -48,14 +48,20 @@ def test_same_row_twice_is_no_quarrel():
 
 def test_longest_ending_counts():
     facts = {"spin.bvh": Facts("any"), "day/spin.bvh": Facts("day"), "elsewhere/kick.bvh": Facts("kick")}
-    assert look_up(facts, ["studio", "day"], "spin.bvh") == Facts("day")
-    assert look_up(facts, ["studio", "night"], "spin.bvh") == Facts("any")
-    assert look_up(facts, ["studio"], "kick.bvh") == Facts("kick")
-    assert look_up(facts, [], "lost.bvh") is None
+    assert row_of(facts, ["studio", "day"], "spin.bvh") == "day/spin.bvh"
+    assert row_of(facts, ["studio", "night"], "spin.bvh") == "spin.bvh"
+    assert row_of(facts, ["studio"], "kick.bvh") == "elsewhere/kick.bvh"
+    assert row_of(facts, [], "lost.bvh") is None
 
 
 def test_a_name_that_is_in_two_folders_elsewhere_is_not_guessed():
-    assert look_up({"a/x.bvh": Facts("1"), "b/x.bvh": Facts("2")}, ["c"], "x.bvh") is None
+    assert row_of({"a/x.bvh": Facts("1"), "b/x.bvh": Facts("2")}, ["c"], "x.bvh") is None
+
+
+def test_a_column_misspelt_is_told_from_one_that_is_another_s():
+    assert misspelt_columns(b"file,lable,License,frames\n") == {"lable": "label"}
+    assert misspelt_columns(b"path,content,class,dataset,suggested_class,fps\n") == {}
+    assert misspelt_columns(b"") == {}
 
 
 def test_which_files_are_read():
