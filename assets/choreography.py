@@ -21,7 +21,7 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
     CHOREOGRAPHY,
     group="dance",
     code_version="2",
-    settings="path match_path dance",
+    settings="path match_path dance.blend_s",
     sources="request",
     partitions=DANCE,
     ins={name: _EVERY_CLIP for name in ("clip", "canonical_pose", "motion_feature", "motion_beat")},
