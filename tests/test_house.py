@@ -50,8 +50,8 @@ TESTED_ELSEWHERE = {
     "assets/declare.py",
     "assets/graph.py",
     "assets/matching.py",
-    "assets/sequence.py",
     "assets/motion.py",
+    "assets/search.py",
     "assets/music.py",
     "assets/partitions.py",
     "assets/formats/errors.py",
@@ -66,6 +66,7 @@ TESTED_ELSEWHERE = {
     "pipelines/progress.py",
     "pipelines/resources.py",
     "pipelines/schedules.py",
+    "pipelines/searchable.py",
     "schemas/calibration.py",
     "schemas/choreography.py",
     "schemas/fields.py",
@@ -73,6 +74,7 @@ TESTED_ELSEWHERE = {
     "schemas/matching.py",
     "schemas/motion.py",
     "schemas/music.py",
+    "schemas/search.py",
     "schemas/usd.py",
 }
 

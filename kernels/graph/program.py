@@ -103,6 +103,11 @@ class Program:
         self.price = np.zeros(self.n_nodes) if stretch_price is None else stretch_price
         self.missed = [beat_cost(graph, end, d, costs) for end, (_, d) in zip(self.end, steps, strict=True)]
 
+    @property
+    def transitions(self) -> tuple[Int, Int, Float]:
+        """Source, target and cost of every transition, sorted by source, then target; (E,) each."""
+        return self._source, self._target, self._edge_cost
+
     def step_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float | None:
         """Cost of a kind of step at a beat, one a node: warp, stride, missed beats; infinite where it cannot be danced.
 
