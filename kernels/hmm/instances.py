@@ -11,15 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.hmm.durations import LEAST_WARP, MOST_WARP
+from kernels.hmm.durations import EASY_WARP, LEAST_WARP, MOST_WARP
 from kernels.matching.path import viterbi
 from kernels.types import Float, Int
 
-EASY_WARP = (0.9, 1.1)
 HARD_COST = 4.0
 """Added where the pace is beyond the easy bounds: as much as several rough seams."""
 
-LONGEST_RUN = 32
+LONGEST_RUN = 16
+"""Longer runs are all alike: a dance is not to be one long quotation where it need not be."""
+
+VARIETY = 0.3
+"""Mean of what is added to costs at random when motions are shortlisted, so that not always the same few are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ def warp_cost(span_s: Float, motion_s: Float) -> Float:
     return np.asarray((np.log(warp) / np.log(1.1)) ** 2 + np.where(easy, 0.0, HARD_COST), np.float64)
 
 
-def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24) -> list[Int]:
+def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24, seed: int = 0) -> list[Int]:
     """Find motions for each step of a path: those that can be danced on end, and those nearest to their own pace.
 
     Parameters
@@ -62,6 +65,8 @@ def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24) ->
     state : (S,) int64, basic motion of each step
     span_s : (S,) float, seconds of song each takes
     most : int, >= 2
+    seed : int
+        Of the variety among motions that suit as well.
 
     Returns
     -------
@@ -83,8 +88,9 @@ def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24) ->
     ahead = _runs(fits[::-1], after, len(length))[::-1]
     behind = _runs(fits, before, len(length))
     found = []
+    rng = np.random.default_rng(seed)
     for step, here in enumerate(fits):
-        cost = warp_cost(span_s[step], length[here])
+        cost = warp_cost(span_s[step], length[here]) + rng.exponential(VARIETY, len(here))
         run = ahead[step] + behind[step]
         by_run = np.lexsort((here, cost, -run))
         by_pace = np.lexsort((here, cost))
