@@ -61,8 +61,8 @@ def cluster(vectors: Float, *, n_states: int = 0, seed: int = 0) -> States:
     ----------
     vectors : (N, D) float, N >= 1, finite
     n_states : int, >= 0
-        0: chosen among :data:`SIZES` by clearness (the simplified silhouette): the clearest (or almost) where that is at least
-        :data:`CLEAR`, else the largest at least :data:`CLEAR_RATIO` as clear as the clearest; with
+        0: chosen among :data:`SIZES` by clearness (the simplified silhouette): the clearest (or almost) where that is
+        at least :data:`CLEAR`, else the largest at least :data:`CLEAR_RATIO` as clear as the clearest; with
         :data:`FEWEST_EACH` motions a state on average.
     seed : int
 

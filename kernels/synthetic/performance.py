@@ -49,7 +49,7 @@ def hidden_rules(*, n_states: int = 8, n_symbols: int = 12, loyalty: float = 0.8
     n_states : int, 3 to 8
     n_symbols : int, n_states to 12
     loyalty : float, 0 to 1
-        Share of a motion's strokes that fall on its own drum; at 1 / n_symbols the music tells nothing.
+        Share of a motion's strokes that fall on its own drum, beside those by chance; at 0 the music tells nothing.
     seed : int
 
     Returns
