@@ -23,7 +23,7 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
     CHOREOGRAPHY,
     group="dance",
     code_version="3",
-    settings="path match_path hmm_path choreography_model dance",
+    settings="path match_path hmm_path choreography_model dance.blend_s",
     sources="request",
     partitions=DANCE,
     ins={name: _EVERY_CLIP for name in ("clip", "canonical_pose", "motion_feature", "motion_beat", "key_pose")},

@@ -292,8 +292,8 @@ def _facts_of(said: Iterable[_Said], file: File) -> Facts:
             if row is not None:
                 table.used.add(row)
                 found = table.facts[row]
-                return found if found.label else replace(found, label=fallback)
-    return Facts(label=fallback)
+                return found if found.label else replace(found, label=fallback, is_labelled=False)
+    return Facts(label=fallback, is_labelled=False)
 
 
 def _hashed(root: Path, file: File, cache: HashCache, now_ns: int) -> tuple[str, str]:

@@ -195,6 +195,55 @@ def check(
 
 
 @app.command()
+def search(
+    clip: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="CLIP", help="A clip's key, CLIP@2.5-4 for a stretch of it, or a BVH file.", show_default=False
+        ),
+    ] = None,
+    studio: StudioOption = None,
+    k: Annotated[int, typer.Option("-k", help="How many clips to find.", min=1, max=1000)] = 10,
+    label: Annotated[
+        list[str] | None, typer.Option("--label", help="Only clips of this label; may be repeated.")
+    ] = None,
+    style: Annotated[list[str] | None, typer.Option("--style", help="Only clips of this style.")] = None,
+    licence: Annotated[list[str] | None, typer.Option("--licence", help="Only clips of this licence.")] = None,
+    min_seconds: Annotated[float, typer.Option("--min-seconds", help="Only clips at least this long.", min=0.0)] = 0.0,
+    max_seconds: Annotated[
+        float | None, typer.Option("--max-seconds", help="Only clips at most this long.", min=0.0)
+    ] = None,
+    like: Annotated[list[str] | None, typer.Option("--like", help="More like this motion too.")] = None,
+    unlike: Annotated[list[str] | None, typer.Option("--unlike", help="Less like this motion.")] = None,
+    sheet: Annotated[Path | None, typer.Option("--sheet", help="Draw query and hits as stick figures: a PNG.")] = None,
+    train: Annotated[bool, typer.Option("--train", help="Train the encoder anew on the clips there are now.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Find the clips most like a motion.
+
+    Examples: odori search ayame-step · odori search ayame-step@2.5-4 -k 5 --style salsa · odori search take.bvh ·
+    odori search --like ayame-step --unlike kaede-kick --sheet hits.png
+    """
+    with _Trouble(as_json):
+        from pipelines import search as searching
+
+        wish = searching.Wish(
+            query=clip or "",
+            k=k,
+            label=label or (),
+            style=style or (),
+            licence=licence or (),
+            min_seconds=min_seconds,
+            max_seconds=float("inf") if max_seconds is None else max_seconds,
+            like=like or (),
+            unlike=unlike or (),
+        )
+        # The bar is made where something has to be: loading it loads Dagster.
+        result = searching.search(_folder(studio), wish, sheet=sheet, train=train, progress=lambda: _progress()())
+        _finish(result, as_json)
+
+
+@app.command()
 def calibrate(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="A suit recording: .parquet or .csv.")],
     bvh: Annotated[Path | None, typer.Option("--bvh", help="Also write the motion as BVH here.")] = None,

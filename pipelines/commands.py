@@ -27,7 +27,7 @@ from pipelines.web import existing
 from schemas.pins import parse_pin
 
 
-class _Session:
+class Session:
     """A studio opened for work: held, tidied, its definitions loaded."""
 
     def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
@@ -87,7 +87,7 @@ def check_settings(studio: StudioFolder) -> None:
 def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
     """Bring a studio up to date."""
     studio = existing(root)
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     sources = work.state.sources
     if not sources.clips and not sources.songs:
         raise StudioError(f"{root}: want clips under clips/ and songs under songs/, got none; put some there")
@@ -148,7 +148,7 @@ def dance(
     pins = _pin_texts(pins)
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
     character = casting.named(studio, work.state.sources, character)
     if out is not None and len(songs) > 1:
@@ -198,7 +198,7 @@ def propose(
     """List what could be pinned at a place of a song, building first what that takes; nothing is danced."""
     studio = existing(root)
     pins = _pin_texts(pins)
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     songs = _wanted(work.state, [wanted], studio)
     if len(songs) > 1:
         raise StudioError(f"--propose: want one song, got {len(songs)}")

@@ -5,10 +5,15 @@ The only place that reads the environment.
 
 import json
 import os
+import zipfile
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from upath import UPath
 
 from assets import sources
@@ -160,3 +165,22 @@ def pair_distance(settings: OpenClSettings) -> PairDistance:
     from kernels.opencl.pose_distance import PoseDistance
 
     return PoseDistance(cl.Context([pick_device(settings.device)]))
+
+
+class GraphMemory:
+    """Arrays the motion graph keeps in the lake; see :class:`assets.graph_memory.Memory`."""
+
+    def __init__(self, lake: Lake) -> None:
+        self._path = lake.root / "motion_graph.npz"
+
+    def recall(self) -> dict[str, NDArray[Any]] | None:
+        """Read what was kept."""
+        try:
+            with self._path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+                return {name: kept[name] for name in kept.files}
+        except (OSError, ValueError, zipfile.BadZipFile, EOFError):
+            return None  # none yet, or damaged: everything is computed again
+
+    def keep(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Keep these instead of what was kept."""
+        write_beside(self._path, lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]
