@@ -1,6 +1,6 @@
 """From the matches of a song to its steps: pieces of clips, how they join, and the best sequence of them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,13 +99,16 @@ def load_matches(
     music_feature: Stored,
     motion_feature: Stored,
     motion_beat: Stored,
+    *,
+    may_dance: Container[str],
 ) -> LoadedMatches:
-    """Read a song's matches and the clips they name; where a segment has none, the longest clips as well."""
+    """Read a song's matches among the clips that may be danced; where a segment has none, the longest clips as well."""
     segments = matching_tables.to_music_segment(music_segment.read(song_id))
-    matches = matching_tables.to_matches(match.read(song_id), len(segments.start_s))
+    every = matching_tables.to_matches(match.read(song_id), len(segments.start_s))
+    matches = [m.only([clip in may_dance for clip in m.clip_ids]) for m in every]
     wanted = {clip for m in matches for clip in m.clip_ids}
     if any(not m.clip_ids for m in matches):
-        wanted |= _longest(motion_feature)
+        wanted |= _longest(motion_feature, may_dance)
     clips: dict[str, ClipFeatures] = {}
     for key in motion_feature.keys:
         here = wanted & set(motion_feature.stamp(key).clips)
@@ -128,9 +131,9 @@ def load_matches(
     )
 
 
-def _longest(motion_feature: Stored, *, most: int = 20) -> set[str]:
+def _longest(motion_feature: Stored, may_dance: Container[str], *, most: int = 20) -> set[str]:
     sizes = {c: r.num_rows for key in motion_feature.keys for c, r in tables.by_clip(motion_feature.read(key)).items()}
-    names = sorted(sizes)
+    names = sorted(clip for clip in sizes if clip in may_dance)
     return {names[i] for i in longest_first(np.array([sizes[n] for n in names], np.int64), most=most)}
 
 
