@@ -162,7 +162,8 @@ def train_document(
 
     @eqx.filter_jit
     def step(encoder: DocumentEncoder, state: Any, memory: Any, image: Any, mask: Any, of: Any) -> Any:  # noqa: ANN401
-        gradient, state = eqx.filter_grad(loss, has_aux=True)(encoder, state, image, mask, of)
+        slope: Any = eqx.filter_grad(loss, has_aux=True)
+        gradient, state = slope(encoder, state, image, mask, of)
         update, memory = optimiser.update(gradient, memory, eqx.filter(encoder, eqx.is_inexact_array))
         return eqx.apply_updates(encoder, update), state, memory
 
