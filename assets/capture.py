@@ -35,7 +35,7 @@ from schemas.motion import CLIP, POSE, SKELETON
     # Poses first: they are made one session at a time while they are stored, and leave the small tables behind.
     (POSE, SKELETON, CALIBRATION, CLIP),
     group="capture",
-    code_version="2",
+    code_version="3",
     settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,
@@ -208,6 +208,7 @@ class _Reader:
                 settings=self._settings.calibration,
                 sensors=self._settings.sensors,
                 solvers=self._solvers,
+                max_bytes=self._max_bytes,
             )
             mapping = map_joints(found.clip.skeleton, self._settings.joints)
         except (FormatError, CalibrationError, ValueError, OSError) as error:

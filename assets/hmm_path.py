@@ -29,8 +29,8 @@ LARGEST_POOL = 20_000
 """Motions a dance is chosen from; performances first, then clips in order of their names."""
 
 LONGEST_SPAN = 8
-UNCONNECTED_COST = 1.0
-"""Added to a seam between poses beyond the thresholds."""
+SEAM_COST, UNCONNECTED_COST = 0.25, 1.0
+"""Of any seam, however alike the poses, and added where they are beyond the thresholds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +245,8 @@ def _recordings(
     )
     goes_on = [continues(a, b) for a, b in itertools.pairwise(candidates)]
     seam = [
-        np.where(on, 0.0, j.cost + UNCONNECTED_COST * ~j.is_connected) for on, j in zip(goes_on, joints, strict=True)
+        np.where(on, 0.0, SEAM_COST * weights.seam_weight + j.cost + UNCONNECTED_COST * ~j.is_connected)
+        for on, j in zip(goes_on, joints, strict=True)
     ]
     choice, repetition, total = instances.choose(short, pace, seam, repetition_weight=weights.repetition_weight)
     pairs = list(itertools.pairwise(choice))

@@ -140,6 +140,9 @@ class MatchPathSettings(_Checked):
         "Price of a seam between poses beyond the thresholds; 0: as few of them as can be, before any cost counts.",
         least=0,
     )
+    other_starts: int = key(
+        4, "Other places of each matched clip that are tried too, where they match nearly as well.", least=0, most=50
+    )
     snap_loss_ratio: float = key(
         0.05,
         "A piece starts on a beat of its clip where that loses less than this share of its score.",
@@ -272,4 +275,5 @@ class Brief(_Checked):
     pin: tuple[PinWish, ...] = key((), "What is to be danced when: one [[pin]] each, a place and a wish.")
     pins: str = key("hard", "'hard': kept or refused; 'soft': a price where not kept.", values=("hard", "soft"))
     allow: tuple[str, ...] = key((), "Licences of the clips that may be danced; empty for all.")
+    character: str = key("", "Whose body is danced with: a clip's key, or a rigged USD file beside the songs.")
     beats: BeatsBrief = field(default_factory=BeatsBrief)

@@ -15,7 +15,7 @@ import numpy as np
 from kernels.hmm.model import Model, Performed, Smoothing, folds, learn, without
 from kernels.types import Float, Int
 
-N_SHUFFLES = 499
+N_SHUFFLES = 199
 BLOCK = 8
 """Motions of one stretch: what changes more slowly (a verse, a chorus) is kept together when music is shuffled."""
 

@@ -18,15 +18,16 @@ SIZES: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 20, 24, 32
 FEWEST_EACH = 12
 """No more states are tried than leave so many motions to each on average: fewer cannot be counted."""
 
-CLEAR = 0.7
-"""Clearness from which motions fall into kinds by themselves: then there are as many states as kinds."""
+CLEAR, ALIKE_RATIO = 0.7, 0.97
+"""Clearness from which motions fall into kinds by themselves: then the clearest number of states is taken, of numbers
+almost as clear (at least so much of it) the largest."""
 
 CLEAR_RATIO = 0.7
 """Else, as with most dancers, the largest number of states is chosen that is at least so clear as the clearest: finer
 states follow the dancer more closely, and cutting across no kinds they lose nothing."""
 
 MOST_DIMENSIONS = 24
-STARTS, TRIAL_STARTS, MOST_ROUNDS = 8, 3, 100
+STARTS, MOST_ROUNDS = 8, 100
 MOST_TRIED = 1500
 """Numbers of states are tried on so many motions, taken evenly from all."""
 
@@ -60,8 +61,8 @@ def cluster(vectors: Float, *, n_states: int = 0, seed: int = 0) -> States:
     ----------
     vectors : (N, D) float, N >= 1, finite
     n_states : int, >= 0
-        0: chosen among :data:`SIZES` by clearness (the simplified silhouette): the clearest where that is at least
-        :data:`CLEAR`, else the largest at least :data:`CLEAR_RATIO` as clear as the clearest; with
+        0: chosen among :data:`SIZES` by clearness (the simplified silhouette): the clearest (or almost) where that is
+        at least :data:`CLEAR`, else the largest at least :data:`CLEAR_RATIO` as clear as the clearest; with
         :data:`FEWEST_EACH` motions a state on average.
     seed : int
 
@@ -94,7 +95,7 @@ def cluster(vectors: Float, *, n_states: int = 0, seed: int = 0) -> States:
         else:
             sizes = [k for k in SIZES if k <= min(len(vectors) // FEWEST_EACH, n_different - 1)] or [1]
         some = low[:: max(-(-len(low) // MOST_TRIED), 1)]
-        tried = tuple((k, clearness(some, k_means(some, k, seed=seed, starts=TRIAL_STARTS), k)) for k in sizes)
+        tried = tuple((k, clearness(some, k_means(some, k, seed=seed), k)) for k in sizes)
         label = k_means(low, _chosen(tried), seed=seed)
     return _states(vectors, label, tried)
 
@@ -102,7 +103,7 @@ def cluster(vectors: Float, *, n_states: int = 0, seed: int = 0) -> States:
 def _chosen(tried: tuple[tuple[int, float], ...]) -> int:
     best = max(clear for _, clear in tried)
     if best >= CLEAR:
-        return min(k for k, clear in tried if clear == best)
+        return max(k for k, clear in tried if clear >= ALIKE_RATIO * best)
     return max(k for k, clear in tried if clear >= CLEAR_RATIO * best)
 
 
@@ -117,7 +118,7 @@ def _principal(vectors: Float) -> Float:
     return np.asarray(centred @ (kept * sign), np.float64)
 
 
-def k_means(points: Float, k: int, *, seed: int = 0, starts: int = STARTS) -> Int:
+def k_means(points: Float, k: int, *, seed: int = 0) -> Int:
     """Cluster points by Lloyd's algorithm from several k-means++ starts.
 
     Parameters
@@ -125,7 +126,6 @@ def k_means(points: Float, k: int, *, seed: int = 0, starts: int = STARTS) -> In
     points : (N, D) float, N >= k
     k : int, >= 1
     seed : int
-    starts : int, >= 1
 
     Returns
     -------
@@ -133,7 +133,7 @@ def k_means(points: Float, k: int, *, seed: int = 0, starts: int = STARTS) -> In
     """
     rng = np.random.default_rng(seed)
     best, least = np.zeros(len(points), np.int64), np.inf
-    for _ in range(starts if k > 1 else 1):
+    for _ in range(STARTS if k > 1 else 1):
         label, total = _lloyd(points, _plus_plus(points, k, rng))
         if total < least - 1e-12:
             best, least = label, total

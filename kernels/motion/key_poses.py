@@ -49,6 +49,10 @@ LEAST_PROMINENCE_RATIO, LEAST_PROMINENCE_RAD_PER_S2 = 0.06, 0.3
 
 SHORTEST_S, LONGEST_S = 0.25, 2.0
 
+CHANGE_WEIGHT = 2.0
+"""How much what a motion changes of the body counts against the posture it starts from: the same step, danced a little
+more upright, is the same step."""
+
 
 @dataclass(frozen=True, eq=False)
 class KeyPoses:
@@ -213,21 +217,34 @@ def pose_vectors(position_xyz_m: Float, root_wxyz: Float, frame_rate_hz: float, 
     Returns
     -------
     (N, 9 J) float64, metres
-        Joints at start, peak and end (nearest frames), seen from where the hips stand on the floor at the start and
-        turned so that they face +Z there: where the dancer is and faces does not count, how far the motion carries and
-        turns him does.
+        Joints at start, peak and end, between frames by lines, seen from where the hips stand on the floor at the
+        start and turned so that they face +Z there: where the dancer is and faces does not count, how far the motion
+        carries and turns him does. The pose at the start, and the change from it to the other two, weighted by
+        :data:`CHANGE_WEIGHT`.
     """
-    n_frames = len(position_xyz_m)
-    frame = [
-        np.clip(np.rint(at * frame_rate_hz).astype(np.int64), 0, n_frames - 1)
-        for at in (motions.start_s, motions.peak_s, motions.end_s)
-    ]
-    origin = position_xyz_m[frame[0], 0] * np.array([1.0, 0.0, 1.0])
-    facing = rotation.from_heading(-rotation.heading_rad(root_wxyz[frame[0]]))
-    poses = [rotation.apply(facing[:, None], position_xyz_m[f] - origin[:, None]) for f in frame]
-    return np.concatenate(poses, axis=1).reshape(len(frame[0]), 9 * position_xyz_m.shape[1])
+    last = len(position_xyz_m) - 1
+    moments = [np.clip(at * frame_rate_hz, 0, last) for at in (motions.start_s, motions.peak_s, motions.end_s)]
+    poses = []
+    for at in moments:
+        below = np.minimum(at.astype(np.int64), max(last - 1, 0))
+        share = (at - below)[:, None, None]
+        poses.append((1 - share) * position_xyz_m[below] + share * position_xyz_m[np.minimum(below + 1, last)])
+    origin = poses[0][:, 0] * np.array([1.0, 0.0, 1.0])
+    first = np.rint(moments[0]).astype(np.int64)
+    facing = rotation.from_heading(-rotation.heading_rad(root_wxyz[first]))
+    turned = [rotation.apply(facing[:, None], p - origin[:, None]) for p in poses]
+    return to_vectors(np.stack(turned, axis=1))
+
+
+def to_vectors(poses_xyz_m: Float) -> Float:
+    """Weigh key poses, (N, 3, J, 3) metres, as motions are compared: vectors of :func:`pose_vectors`, (N, 9 J)."""
+    start = poses_xyz_m[:, :1]
+    parts = np.concatenate([start, CHANGE_WEIGHT * (poses_xyz_m[:, 1:] - start)], axis=1)
+    return np.asarray(parts.reshape(len(parts), 9 * poses_xyz_m.shape[2]), np.float64)
 
 
 def to_poses(vector: Float) -> NDArray[np.float64]:
     """Unpack vectors of :func:`pose_vectors`, (N, 9 J), to poses, (N, 3, J, 3) float64, metres."""
-    return vector.reshape(len(vector), 3, -1, 3)
+    parts = vector.reshape(len(vector), 3, -1, 3)
+    start = parts[:, :1]
+    return np.concatenate([start, start + parts[:, 1:] / CHANGE_WEIGHT], axis=1)
