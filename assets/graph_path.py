@@ -22,6 +22,7 @@ from kernels.graph.costs import PathCosts
 from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
 from kernels.graph.pins import Pin, Reach, admitted, find_conflict
 from kernels.types import Choreography, Float, Int, MotionGraph
+from schemas.keys import source_clip
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
 
@@ -95,7 +96,7 @@ def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame
         Without the transitions of clips that may not be changed: those are danced whole or not at all.
     """
     known = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
-    facts = [known[clip] for clip in clip_ids]
+    facts = [known[source_clip(clip)] for clip in clip_ids]
     of_node = graph.clip_index
     licence = [str(row["licence"]) for row in facts]
     is_whole = np.array([licences.terms_of(name).no_derivatives for name in licence] or [False])[of_node]
@@ -212,7 +213,7 @@ def kept_pins(pins: Sequence[Pin], song: SongBeats, path: Path, known: Catalogue
     node: dict[int, int] = {}
     for k, d, u in zip(path.beat_index.tolist(), path.beat_span.tolist(), path.source_node.tolist(), strict=True):
         for interval in range(k, k + d):
-            clip[interval], node[interval] = known.clip_ids[known.graph.clip_index[u]], u
+            clip[interval], node[interval] = source_clip(known.clip_ids[known.graph.clip_index[u]]), u
     facts = direction.kept(pins, song, clip)
     for pin, fact in zip(pins, facts, strict=True):
         fact["is_kept"] = bool(all(pin.nodes[node[k]] for k in range(pin.first, pin.last)))
