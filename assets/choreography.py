@@ -7,10 +7,12 @@ from assets import tables
 from assets.declare import table_asset
 from assets.direction import Song as SongBeats
 from assets.graph_path import by_graph, catalogue, direction_of, read_clips
+from assets.hmm_path import by_hmm, load_dancer
+from assets.hmm_tables import to_performances
 from assets.lineage import Part, Progress, Stored, repeatable
 from assets.partitions import DANCE, EVERY, base_method, lake_key
 from assets.sequence import by_matching, load_matches
-from assets.sources import Studio, request_version
+from assets.sources import Studio, request_of, request_version
 from kernels.assembly.timing import cover
 from schemas.choreography import CHOREOGRAPHY
 
@@ -20,23 +22,31 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 @table_asset(
     CHOREOGRAPHY,
     group="dance",
-    code_version="2",
-    settings="path match_path dance",
+    code_version="3",
+    settings="path match_path hmm_path choreography_model dance",
     sources="request",
     partitions=DANCE,
-    ins={name: _EVERY_CLIP for name in ("clip", "canonical_pose", "motion_feature", "motion_beat")},
+    ins={name: _EVERY_CLIP for name in ("clip", "canonical_pose", "motion_feature", "motion_beat", "key_pose")},
     methods={
         "motion_graph_node": "graph",
         "motion_graph_edge": "graph",
-        "clip": "graph",
+        "clip": "graph,hmm",
         "[path]": "graph",
         "match": "matching",
         "music_segment": "matching",
         "music_feature": "matching",
         "motion_feature": "matching",
         "motion_beat": "matching",
-        "canonical_pose": "matching",
+        "canonical_pose": "matching,hmm",
         "[match_path]": "matching",
+        "key_pose": "hmm",
+        "performance": "hmm",
+        "choreography_model": "hmm",
+        "music_evidence": "hmm",
+        "percussion": "hmm",
+        "melody": "hmm",
+        "[hmm_path]": "hmm",
+        "[choreography_model]": "hmm",
     },
 )
 def choreography(
@@ -50,12 +60,18 @@ def choreography(
     motion_feature: Stored,
     motion_beat: Stored,
     canonical_pose: Stored,
+    key_pose: Stored,
+    performance: Stored,
+    choreography_model: Stored,
+    music_evidence: Stored,
+    percussion: Stored,
+    melody: Stored,
     music_beat: pa.Table,
     song: pa.Table,
     studio: dg.ResourceParam[Studio],
     progress: dg.ResourceParam[Progress],
 ) -> Part:
-    """Choose what is danced when: a way through the motion graph, or a sequence of matches."""
+    """Choose what is danced when: a way through the motion graph, a sequence of matches, or what the model says."""
     progress.begin("choosing the steps", 1)
     key = lake_key(context.partition_key)
     song_id, method = key.split("|")
@@ -72,9 +88,37 @@ def choreography(
         clips = read_clips([clip.read(session) for session in clip.keys])
         known = catalogue(graph, clip_ids, clips, asked.allow)
         danced = by_graph(known, SongBeats(beat_s, grid, duration_s), settings, asked)
-    elif asked.wishes or asked.allow:
+    elif asked.wishes:
         raise dg.Failure(
-            f"{song_id}: pins and licences are kept by the graph method alone; dance it with --method graph",
+            f"{song_id}: pins are kept by the graph method alone; dance it with --method graph", allow_retries=False
+        )
+    elif method == "hmm":
+        dancer = load_dancer(
+            choreography_model.read(),
+            music_evidence.read(),
+            key_pose,
+            {p.clip_id for p in to_performances(performance.read())},
+            read_clips([clip.read(session) for session in clip.keys]),
+            allow=asked.allow,
+            settings=settings,
+        )
+        drums, tune = percussion.read(song_id), melody.read(song_id)
+        request = request_of(studio, key)
+        with repeatable():
+            danced = by_hmm(
+                dancer,
+                drums,
+                tune,
+                beat_s,
+                duration_s,
+                canonical_pose,
+                settings,
+                temperature=request.temperature,
+                seed=request.seed,
+            )
+    elif asked.allow:
+        raise dg.Failure(
+            f"{song_id}: licences are kept by the methods graph and hmm alone; dance it with --method graph",
             allow_retries=False,
         )
     else:
@@ -82,5 +126,5 @@ def choreography(
         with repeatable():
             danced = by_matching(found, canonical_pose, beat_s, settings)
     progress.step()
-    rows = tables.from_choreography(song_id, method, danced.steps, danced.costs, danced.pin_ids)
+    rows = tables.from_choreography(song_id, method, danced.steps, danced.costs, danced.pin_ids, danced.states)
     return Part(key, rows, request_version(studio, key), metadata=danced.metadata)

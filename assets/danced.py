@@ -4,14 +4,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from kernels.types import Choreography, Float
+from kernels.types import Choreography, Float, Int
 
 
 @dataclass(frozen=True, eq=False)
 class Danced:
-    """Steps a method chose, their costs by column (0 for the columns of other methods), and what to show of them."""
+    """Steps a method chose, their costs by column (0 for the columns of other methods), and what to show of them.
+
+    ``states`` are basic motions by step, where the method has them.
+    """
 
     steps: Choreography
     costs: Mapping[str, Float]
     metadata: Mapping[str, Any]
     pin_ids: Sequence[str | None] = ()
+    states: Int | None = None

@@ -15,6 +15,8 @@ warnings.filterwarnings("ignore", category=dg.BetaWarning)
 SETTINGS_KEY = "odori/settings"
 SOURCES_KEY = "odori/sources"
 METHODS_KEY = "odori/methods"
+KEEPS_KEY = "odori/keeps"
+ONLY_FOR_KEY = "odori/only_for"
 
 
 def table_asset(
@@ -28,7 +30,9 @@ def table_asset(
     ins: Mapping[str, dg.AssetIn] | None = None,
     checks: Mapping[str, str] | None = None,
     methods: Mapping[str, str] | None = None,
+    only_for: str = "",
     io_manager: str = "lake",
+    keeps: bool = False,
 ) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
     """Declare an asset that stores a table of its own name.
 
@@ -42,15 +46,18 @@ def table_asset(
     partitions : how it is cut; many sessions or songs are made in one run
     ins : inputs whose partitions do not match its own
     checks : asset checks it yields, by name, each with what it believes
-    methods : of a dance, the one method that needs an input or a section of settings (``[section]``), by its name
+    methods : of a dance, the methods (joined by commas) that need an input or a section of settings (``[section]``), by
+        its name; all where nothing is said
+    only_for : the one method of dancing it is made for; made where that is used, see ``pipelines/freshness.py``
     io_manager : who stores it
+    keeps : once made it stays when its inputs change; only its code, its settings or a person make it anew
     """
     made: Callable[[Callable[..., Any]], dg.AssetsDefinition] = dg.asset(
         name=table.name,
         group_name=group,
         code_version=code_version,
         description=table.meaning,
-        metadata=_metadata(table, settings, sources, methods or {}),
+        metadata=_metadata(table, settings, sources, only_for, methods or {}, keeps=keeps),
         io_manager_key=io_manager,
         partitions_def=partitions,
         backfill_policy=_backfill(partitions),
@@ -71,6 +78,7 @@ def table_assets(
     partitions: dg.PartitionsDefinition[str] | None = None,
     ins: Mapping[str, dg.AssetIn] | None = None,
     checks: Mapping[str, tuple[Table, str]] | None = None,
+    only_for: str = "",
 ) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
     """Declare assets made in one pass, stored in the order of ``tables``; arguments as :func:`table_asset`.
 
@@ -83,7 +91,7 @@ def table_assets(
                 group_name=group,
                 code_version=code_version,
                 description=table.meaning,
-                metadata=_metadata(table, settings, sources),
+                metadata=_metadata(table, settings, sources, only_for),
                 io_manager_key="lake",
             )
             for table in tables
@@ -100,8 +108,20 @@ def _backfill(partitions: dg.PartitionsDefinition[str] | None) -> dg.BackfillPol
     return dg.BackfillPolicy.single_run() if isinstance(partitions, dg.DynamicPartitionsDefinition) else None
 
 
-def _metadata(table: Table, settings: str, sources: str, methods: Mapping[str, str] | None = None) -> dict[str, Any]:
+def _metadata(
+    table: Table,
+    settings: str,
+    sources: str,
+    only_for: str = "",
+    methods: Mapping[str, str] | None = None,
+    *,
+    keeps: bool = False,
+) -> dict[str, Any]:
     said = {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
+    if only_for:
+        said[ONLY_FOR_KEY] = only_for
+    if keeps:
+        said[KEEPS_KEY] = "true"
     if methods:
         said[METHODS_KEY] = " ".join(f"{name}={method}" for name, method in methods.items())
     return said

@@ -79,12 +79,18 @@ def to_pin(wish: PinWish, song: Song, nodes: Nodes) -> Pin:
     DirectionError
         If the place is not in the song, or its bars are not known.
     """
-    first, last = _stretch(wish, song)
+    first, last = stretch(wish, song)
     return Pin(wish.text, first, last, nodes.wished(wish))
 
 
-def _stretch(wish: PinWish, song: Song) -> tuple[int, int]:
-    """Music intervals of a pin, first <= k < last."""
+def stretch(wish: PinWish, song: Song) -> tuple[int, int]:
+    """Find the music intervals of a pin, first <= k < last.
+
+    Raises
+    ------
+    DirectionError
+        If the place is not in the song, or its bars are not known.
+    """
     n = len(song.grid_s) - 1
     if wish.place:
         return (0, 1) if wish.place == "start" else (n - 1, n)

@@ -19,7 +19,7 @@ from kernels.graph.features import BeatFeatures, beat_features, concatenate_beat
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
 from kernels.graph.transitions import Transitions, blend_margin_s, find_transitions
-from kernels.motion.velocity import accents
+from kernels.motion.velocity import accents, jerk_around
 from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float, MotionGraph
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
@@ -43,13 +43,15 @@ class Beats:
     time_s: Float
     features: BeatFeatures
     accent: Float
+    peak_jerk: Float
+    usual_jerk: Float
 
 
 @table_assets(
     "motion_graph",
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
-    code_version="2",
+    code_version="3",
     settings="motion_graph dance",
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
     checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
@@ -77,7 +79,11 @@ def motion_graph(
         n_nearest=settings.neighbours,
         min_margin_s=blend_margin_s(studio.settings().dance.blend_s),
     )
-    graph = replace(found.graph, accent=np.concatenate([*(b.accent for b in beats), np.zeros(0)]))
+    seen = {
+        name: np.concatenate([*(getattr(b, name) for b in beats), np.zeros(0)])
+        for name in ("accent", "peak_jerk", "usual_jerk")
+    }
+    graph = replace(found.graph, **seen)
     losses = {name: prune(graph) for name, prune in PRUNE.items()}
     kept = losses[settings.prune]
     index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
@@ -125,7 +131,9 @@ def _session(
             metric=settings.metric,  # type: ignore[arg-type]
         )
         accent = accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
-        found.append(Beats(clip_id, labels[clip_id], moved.duration_s, time_s, features, accent))
+        peak, usual = jerk_around(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
+        usual_at = np.full(len(time_s), usual)
+        found.append(Beats(clip_id, labels[clip_id], moved.duration_s, time_s, features, accent, peak, usual_at))
     progress.step()
     return found
 

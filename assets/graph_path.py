@@ -116,7 +116,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
         If no dance can be had, or not with these pins; its metadata hold the conflict and the ways out.
     """
     graph = known.graph
-    pins = _pins(known, song, asked)
+    pins = pins_of(known, song, asked)
     mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
     if not known.is_allowed.any() and len(known.is_allowed):
         raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
@@ -160,7 +160,8 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
     )
 
 
-def _pins(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
+def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
+    """Bring what is wished onto beats and nodes; dg.Failure where a pin names no place of the song."""
     try:
         return [direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:

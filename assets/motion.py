@@ -6,7 +6,7 @@ from dataclasses import replace
 import dagster as dg
 import pyarrow as pa
 
-from assets import matching_plots, matching_tables, plots, tables
+from assets import hmm_tables, matching_plots, matching_tables, plots, tables
 from assets.declare import table_asset
 from assets.lineage import (
     Earlier,
@@ -19,15 +19,18 @@ from assets.lineage import (
     per_clip,
     version_of,
 )
+from assets.motions import cut
 from assets.partitions import SESSION
 from assets.sources import Studio
 from kernels import rotation
+from kernels.hmm.states import assign
 from kernels.motion.beats import BeatSettings, motion_beats
 from kernels.motion.contacts import foot_contacts
 from kernels.motion.features import contacts_at_feature_rate, motion_features
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.retarget import retarget
+from schemas.hmm import KEY_POSE
 from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE
 from schemas.settings import FeatureSettings, MotionBeatSettings
 
@@ -133,6 +136,37 @@ def motion_feature(
         return replace(part, metadata={**part.metadata, "features": picture})
 
     return Parts(session(key) for key in _begun(progress, "motion features", canonical_pose))
+
+
+@table_asset(KEY_POSE, group="motion", code_version="1", settings="basic_motion", partitions=SESSION, only_for="hmm")
+def key_pose(
+    context: dg.AssetExecutionContext,
+    canonical_pose: Stored,
+    basic_motion: Stored,
+    studio: dg.ResourceParam[Studio],
+    earlier: dg.ResourceParam[Earlier],
+    progress: dg.ResourceParam[Progress],
+) -> Parts:
+    """Cut every clip into motions with three key poses each, and tell of which kind each is."""
+    settings = studio.settings().basic_motion
+    states = hmm_tables.to_states(basic_motion.read())
+    code = version_of(code_version(context, KEY_POSE.name), repr(settings), basic_motion.stamp().content)
+
+    def session(key: str) -> Part:
+        poses = tables.by_clip(canonical_pose.read(key))
+
+        def one(clip_id: str) -> pa.Table:
+            if clip_id not in poses:
+                return KEY_POSE.empty()
+            found = cut(poses[clip_id], settings)
+            return hmm_tables.from_key_pose(clip_id, found.motions, *assign(found.vectors, states))
+
+        made_from = clip_versions(canonical_pose, key, code)
+        part = per_clip(KEY_POSE, key, made_from, one, earlier=earlier, progress=progress)
+        known = int((tables.to_numbers(part.table["state_index"]) >= 0).sum())
+        return replace(part, metadata={**part.metadata, "motions": part.table.num_rows, "of_known_kind": known})
+
+    return Parts(session(key) for key in _begun(progress, "key poses", canonical_pose))
 
 
 def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:

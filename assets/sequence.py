@@ -178,7 +178,9 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         )
         for ps in pieces
     ]
-    limits, joints = joints_of(pieces, spans, found.clips, canonical_pose, settings)
+    limits, joints = joints_of(
+        pieces, spans, canonical_pose, blend_s=settings.dance.blend_s, seam_weight=settings.match_path.seam_weight
+    )
     chosen = path.choose(
         candidates,
         joints,
@@ -393,11 +395,7 @@ def match_cost(score: Float, mutual_ratio: Float) -> Float:
 
 
 def joints_of(
-    pieces: Sequence[Sequence[Piece]],
-    spans: Float,
-    clips: Mapping[str, ClipFeatures],
-    canonical_pose: Stored,
-    settings: Settings,
+    pieces: Sequence[Sequence[Piece]], spans: Float, canonical_pose: Stored, *, blend_s: float, seam_weight: float
 ) -> tuple[connect.Thresholds, list[path.Joint]]:
     """Compare the ends of all pieces with the starts of the next, and say which connect.
 
@@ -416,7 +414,7 @@ def joints_of(
     """
     n_links = len(CANONICAL.joints) - 1
     weight = link_weights(CANONICAL.offset_xyz_m, CANONICAL.parent)
-    half_s = settings.dance.blend_s / 2
+    half_s = blend_s / 2
     ends = [_no_poses(len(ps), n_links) for ps in pieces]
     starts = [_no_poses(len(ps), n_links) for ps in pieces]
     lacking_end, lacking_start = ([np.zeros(len(ps)) for ps in pieces] for _ in range(2))
@@ -448,9 +446,7 @@ def joints_of(
         unlike = (pose / limits.pose_rad + speed / limits.speed_rad_per_s) / 2
         # A blend that reaches past a clip's end stands still there.
         stands = MARGIN_COST * (lacking_end[i][:, None] + lacking_start[i + 1][None])
-        joints.append(
-            path.Joint(settings.match_path.seam_weight * unlike + stands, connect.connects(pose, speed, limits))
-        )
+        joints.append(path.Joint(seam_weight * unlike + stands, connect.connects(pose, speed, limits)))
     return limits, joints
 
 

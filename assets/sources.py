@@ -10,6 +10,7 @@ import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
@@ -17,6 +18,7 @@ from assets.formats import clips_csv, settings, suit, tree
 from assets.formats.clips_csv import Facts
 from assets.formats.errors import FormatError
 from assets.formats.tree import File, HashCache
+from assets.performances import Danced, Music, pair
 from schemas.keys import clip_key, part_key, part_of, parts_in_use, session_key, song_key
 from schemas.settings import Brief, Settings
 
@@ -98,6 +100,19 @@ class Sources:
             found[song.key].append(song)
         return {key: tuple(found[key]) for key in sorted(found)}
 
+    @cached_property
+    def performed_songs(self) -> frozenset[str]:
+        """Keys of the songs that clips were danced to."""
+        found, _ = pair(
+            [
+                Danced(c.key, c.path, c.facts.performed_to, c.facts.performed_offset_s)
+                for c in self.clips
+                if not c.problem
+            ],
+            [Music(s.key, s.path, s.kind) for s in self.songs if not s.problem],
+        )
+        return frozenset(one.song_id for one in found)
+
 
 @dataclass(frozen=True)
 class Request:
@@ -107,10 +122,14 @@ class Request:
     ----------
     frame_rate_hz : frames a second of the stage; 0 for the setting
     pins : as on the command line; beside those of the brief
+    temperature : of a dance by the model; None for the setting
+    seed : of what is drawn at random
     """
 
     frame_rate_hz: float = 0.0
     pins: tuple[str, ...] = ()
+    temperature: float | None = None
+    seed: int = 0
 
 
 class Studio(Protocol):
@@ -144,9 +163,7 @@ def fingerprint(facts: object) -> str:
 
 def session_version(clips: Iterable[Clip]) -> str:
     """Version of a session's sources: which files, with which bytes, labelled how."""
-    return fingerprint(
-        [[c.path, c.sha256, c.facts.label, c.facts.style, c.facts.subject, c.facts.licence, c.problem] for c in clips]
-    )
+    return fingerprint([[c.path, c.sha256, asdict(c.facts), c.problem] for c in clips])
 
 
 def song_version(songs: Iterable[Song]) -> str:
@@ -273,8 +290,8 @@ def _facts_of(said: Iterable[_Said], file: File) -> Facts:
             if row is not None:
                 table.used.add(row)
                 found = table.facts[row]
-                return found if found.label else replace(found, label=fallback)
-    return Facts(label=fallback)
+                return found if found.label else replace(found, label=fallback, is_labelled=False)
+    return Facts(label=fallback, is_labelled=False)
 
 
 def _hashed(root: Path, file: File, cache: HashCache, now_ns: int) -> tuple[str, str]:

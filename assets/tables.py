@@ -305,7 +305,10 @@ def from_motion_graph_node(
         pa.array(graph.time_s),
         pa.array(graph.next_node, pa.int32()),
         pa.array([labels[c] for c in graph.clip_index], pa.string()),
-        pa.array(np.zeros(len(graph.time_s)) if graph.accent is None else graph.accent, pa.float32()),
+        *(
+            pa.array(np.zeros(len(graph.time_s)) if values is None else values, pa.float32())
+            for values in (graph.accent, graph.peak_jerk, graph.usual_jerk)
+        ),
         pa.array(is_kept),
     ]
     return MOTION_GRAPH_NODE.check(pa.table(columns, schema=MOTION_GRAPH_NODE.arrow))
@@ -344,6 +347,8 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
         target=target[inside],
         weight=to_numbers(edge["edge_cost"]).astype(np.float64)[inside],
         accent=to_numbers(node["accent_score"]).astype(np.float64),
+        peak_jerk=to_numbers(node["jerk_m_per_s3"]).astype(np.float64),
+        usual_jerk=to_numbers(node["clip_jerk_m_per_s3"]).astype(np.float64),
     )
     return graph, clip_ids
 
@@ -352,11 +357,17 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
 
 
 def from_choreography(
-    song_id: str, method: str, steps: Choreography, costs: Mapping[str, Float], pin_ids: Sequence[str | None] = ()
+    song_id: str,
+    method: str,
+    steps: Choreography,
+    costs: Mapping[str, Float],
+    pin_ids: Sequence[str | None] = (),
+    states: Int | None = None,
 ) -> pa.Table:
     """Pack a choreography, S rows.
 
-    ``costs`` are by column name, 0 where there are none; ``pin_ids`` by step, empty for no pins.
+    ``costs`` are by column name, 0 where there are none; ``pin_ids`` by step, empty for no pins; ``states`` basic
+    motions by step, -1 where the method has none.
     """
     s = len(steps.clip_id)
     columns = {
@@ -372,6 +383,7 @@ def from_choreography(
         "blend_s": pa.array(steps.blend_s, pa.float32()),
         "warp_ratio": pa.array(steps.warp_ratio, pa.float32()),
         "pin_id": pa.array(pin_ids or [None] * s, pa.string()),
+        "state_index": pa.array(np.full(s, -1) if states is None else states, pa.int32()),
         **{name: pa.array(costs.get(name, np.zeros(s)), pa.float32()) for name in _COST_COLUMNS},
     }
     return CHOREOGRAPHY.check(pa.table([columns[c] for c in CHOREOGRAPHY.arrow.names], schema=CHOREOGRAPHY.arrow))

@@ -13,6 +13,7 @@ COLOUR = {
     "motion": "#d9efe0",
     "music": "#fbe6d4",
     "catalog": "#ece2f3",
+    "search": "#e3f0f0",
     "dance": "#f9dede",
 }
 SOURCES = {"clips": "clips/**", "song": "songs/*", "request": "what was asked"}
@@ -35,13 +36,24 @@ PLACES = {
     "motion_feature": (3, 2.6),
     "music_feature": (2, 4.6),
     "music_segment": (2, 5.7),
+    "motion_encoder": (4, -0.4),
+    "motion_embedding": (5, -0.4),
+    "motion_index": (6, -0.9),
+    "label_proposal": (6, 0.1),
     "match": (3, 3.8),
-    "choreography": (4, 2.8),
-    "dance_pose": (5, 2.0),
-    "frame_lineage": (5, 3.6),
-    "dance_quality": (6, 2.0),
-    "usd_animation": (6, 3.6),
-    "files": (7, 3.6),
+    "percussion": (2, 6.8),
+    "melody": (2, 7.8),
+    "performance": (2, 8.8),
+    "basic_motion": (3, 8.4),
+    "key_pose": (4, 8.4),
+    "choreography_model": (5, 6.2),
+    "music_evidence": (5, 7.4),
+    "choreography": (6, 2.8),
+    "dance_pose": (7, 2.0),
+    "frame_lineage": (7, 3.6),
+    "dance_quality": (8, 2.0),
+    "usd_animation": (8, 3.6),
+    "files": (9, 3.6),
 }
 
 
@@ -57,7 +69,7 @@ def box(name: str, label: str, colour: str, note: str = "") -> str:
 def corner(name: str) -> tuple[float, float]:
     """Upper left corner of a box."""
     column, row = PLACES[name]
-    return 12 + STEP_X * column, 34 + STEP_Y * row
+    return 12 + STEP_X * column, 84 + STEP_Y * row
 
 
 def line(start: str, end: str) -> str:
@@ -96,7 +108,7 @@ def picture() -> str:
         f'<text x="{30 + 110 * i}" y="18" class="k">{g}</text>'
         for i, g in enumerate(groups)
     )
-    width, height = 24 + STEP_X * 7 + WIDE, 34 + STEP_Y * 7 + HIGH + 12
+    width, height = 24 + STEP_X * 9 + WIDE, 84 + STEP_Y * 9 + HIGH + 12
     style = (
         ".b{stroke:#555;stroke-width:1}.l{fill:none;stroke:#888;stroke-width:1}"
         "text{font-family:sans-serif;fill:#222}.n{font-size:13px;text-anchor:middle}"

@@ -24,7 +24,7 @@ from pipelines.resources import StudioFolder
 from schemas.keys import check_key
 
 # Stages in order; the groups of one stage run together, clip by clip carried over.
-STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("catalog",), ("dance",))
+STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("catalog",), ("search",), ("dance",))
 GROUPS = tuple(JOB_OF_GROUP)
 _RANGE_START, _RANGE_END = "dagster/asset_partition_range_start", "dagster/asset_partition_range_end"
 PID_TAG = "odori/pid"
@@ -125,29 +125,39 @@ def plan(
         Empty when everything asked for is fresh or was tried.
     """
     wanted = set(groups)
-    findings = [f for f in state.findings(given_up=given_up) if state.assets[f.asset].group in wanted]
+    every = state.findings(given_up=given_up, keys=keys)
+    findings = [f for f in every if state.assets[f.asset].group in wanted]
     if assets is not None:
         findings = [f for f in findings if f.asset in assets]
     if keys is not None:
         findings = [f for f in findings if keys(state.assets[f.asset].kind, f.key)]
+    coming = {(f.asset, f.key) for f in findings if f.state != "fresh"} - set(given_up)
     for stage in STAGES:
         todo = [f for f in findings if state.assets[f.asset].group in stage and f.state != "fresh"]
         if any(f.state != "waiting" for f in todo):
-            batches = [batch for batch in _batches(todo, state, instance) if batch not in tried]
+            batches = [batch for batch in _batches(todo, coming, state, instance) if batch not in tried]
             if batches:
                 return batches
     return []
 
 
-def _batches(todo: Sequence[Finding], state: Freshness, instance: dg.DagsterInstance) -> list[Batch]:
-    """Group partitions that need the same assets, and split them where Dagster's order has others between."""
-    ready = {f.key for f in todo if f.state != "waiting"}
+def _batches(
+    todo: Sequence[Finding], coming: Collection[tuple[str, str]], state: Freshness, instance: dg.DagsterInstance
+) -> list[Batch]:
+    """Group partitions that need the same assets, and split them where Dagster's order has others between.
+
+    What waits for something joins a batch only where that is made in the batch itself.
+    """
     assets_of: dict[str, tuple[str, ...]] = {}
-    for finding in todo:
-        if finding.key in ready:
-            # Assets made in one pass are made together.
-            together = state.assets[finding.asset].together
-            assets_of[finding.key] = tuple(dict.fromkeys((*assets_of.get(finding.key, ()), *together)))
+    for finding in todo:  # inputs come first
+        here = assets_of.get(finding.key, ())
+        awaited = state.input_pairs(finding.asset, finding.key) & set(coming)
+        if finding.state == "waiting" and any(k != finding.key or name not in here for name, k in awaited):
+            continue
+        if finding.state == "waiting" and not awaited:
+            continue
+        # Assets made in one pass are made together.
+        assets_of[finding.key] = tuple(dict.fromkeys((*here, *state.assets[finding.asset].together)))
     batches = []
     for assets in dict.fromkeys(assets_of.values()):
         keys = [key for key, needed in assets_of.items() if needed == assets]

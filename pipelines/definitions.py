@@ -7,7 +7,7 @@ import dagster as dg
 from pipelines import jobs, schedules, sensors
 from pipelines.calibrate import PoseSolvers
 from pipelines.collection import ASSETS, freshness
-from pipelines.io_managers import EarlierTables, LakeIOManager, StageIOManager
+from pipelines.io_managers import EarlierTables, IndexIOManager, LakeIOManager, StageIOManager
 from pipelines.resources import NoProgress, StudioFolder, matcher, pair_distance, studio_from_environment
 
 
@@ -36,6 +36,10 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         ),
         "lake": dg.IOManagerDefinition(
             lambda context: LakeIOManager(context.resources.studio.lake, freshness(context.resources.studio)),
+            required_resource_keys={"studio"},
+        ),
+        "index": dg.IOManagerDefinition(
+            lambda context: IndexIOManager(context.resources.studio, freshness(context.resources.studio)),
             required_resource_keys={"studio"},
         ),
         "stage": dg.IOManagerDefinition(

@@ -1,4 +1,4 @@
-"""A made-up studio on disk: two procedural dancers on two rigs, a third in a suit, and a song as WAV and MIDI."""
+"""A made-up studio on disk: dancers on two rigs, in a suit, and one who follows hidden rules; songs as WAV and MIDI."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +13,7 @@ from kernels.synthetic import rigs
 from kernels.synthetic.dancer import MOVES, Take, take
 from kernels.synthetic.medley import medley, wear
 from kernels.synthetic.music import drum_machine_song
+from kernels.synthetic.performance import Performance, hidden_rules, perform
 from kernels.synthetic.suit import Disturbance, make_body, record
 from pipelines.files import StudioError, write_beside
 
@@ -23,6 +24,8 @@ _SETTINGS = "# A made-up studio. Every key has a default; see 'docs/settings.md'
 # A third dancer wears a suit and dances without a break.
 _SUIT, _SUIT_SEED = "tsubaki", 11
 _MEDLEY = ("step", "twist", "kick", "wave", "rock", "spin")
+# A fourth dances to a drum track by rules that the model of the dancer can be compared with.
+PERFORMER, PERFORMANCE, N_MOTIONS, _RULES_SEED = "sumire", "hidden_rules", 200, 4
 # Beat intervals of the takes, and where each dancer faces: near the song's own beat, and one far from it.
 _TAKES = ((0.50, 0.0, 1.0), (0.54, 0.8, 0.8), (0.62, -1.2, 1.1))
 
@@ -75,9 +78,22 @@ def _files() -> Iterator[tuple[str, bytes]]:
         f"clips/{_SUIT}/clips.csv",
         f"file,label,style,subject,licence\nmedley.parquet,medley,procedural,{_SUIT},CC0-1.0\n".encode(),
     )
+    performed = performance()
+    yield f"clips/{PERFORMER}/{PERFORMANCE}.bvh", bvh.format(performed.clip)
+    yield (
+        f"clips/{PERFORMER}/clips.csv",
+        "file,label,style,subject,licence,performed_to,performed_offset_s\n"
+        f"{PERFORMANCE}.bvh,performance,procedural,{PERFORMER},CC0-1.0,{PERFORMANCE}.mid,0\n".encode(),
+    )
+    yield f"songs/{PERFORMANCE}.mid", midi.format(performed.notes, tempo=performed.tempo)
     song = drum_machine_song(tempo_bpm=TEMPO_BPM, n_bars=16, seed=7)
     yield f"songs/{SONG}.wav", audio.format_wav(Audio(song.render(), 44100))
     yield f"songs/{SONG}.mid", midi.format(song.notes, tempo=song.tempo)
+
+
+def performance() -> Performance:
+    """Dance 200 motions to the drums they call, one a beat."""
+    return perform(hidden_rules(seed=_RULES_SEED), n_motions=N_MOTIONS, interval_s=60 / TEMPO_BPM, seed=_RULES_SEED)
 
 
 def suit_recording() -> Recording:

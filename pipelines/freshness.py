@@ -6,7 +6,7 @@ sensor, the schedule and ``odori status`` all ask here.
 """
 
 import dataclasses
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -14,7 +14,7 @@ from typing import Literal
 import dagster as dg
 
 from assets import sources as source_kinds
-from assets.declare import METHODS_KEY, SETTINGS_KEY, SOURCES_KEY
+from assets.declare import KEEPS_KEY, METHODS_KEY, ONLY_FOR_KEY, SETTINGS_KEY, SOURCES_KEY
 from assets.lineage import Stamp, version_of
 from assets.partitions import ALTERNATIVES, METHODS, base_method
 from assets.sources import Sources
@@ -23,6 +23,8 @@ from pipelines.lake import Lake
 from pipelines.resources import StudioFolder
 
 STAGE_IO_MANAGER = "stage"
+ON_DEMAND = ("search",)
+"""Groups of assets that nobody makes before somebody asked for them once; from then on they are kept up to date."""
 Kind = Literal["session", "song", "dance", "whole"]
 State = Literal["fresh", "stale", "missing", "waiting"]
 
@@ -32,7 +34,8 @@ class Node:
     """One asset as freshness sees it.
 
     ``together`` are the assets made in the same pass, itself included; ``methods`` says, of an input or a section of
-    settings (in brackets), which one method of dancing needs it: every method does where nothing is said.
+    settings (in brackets), which methods of dancing need it: every method does where nothing is said. ``only_for`` is
+    the one method an asset is made for, where there is one. ``keeps``: once made it stays when its inputs change.
     """
 
     name: str
@@ -45,11 +48,13 @@ class Node:
     together: tuple[str, ...]
     writes_stages: bool = False
     methods: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    only_for: str = ""
+    keeps: bool = False
 
     def needs(self, name: str, key: str) -> bool:
         """Whether a partition of this asset is made from an input, or from a section of settings in brackets."""
         method = base_method(key.split("|")[-1])
-        return self.kind != "dance" or self.methods.get(name, method) == method
+        return self.kind != "dance" or method in self.methods.get(name, method).split(",")
 
     def inputs_of(self, key: str) -> list[str]:
         """List the inputs that a partition is made from."""
@@ -83,6 +88,8 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
                 together,
                 definition.get_io_manager_key_for_asset_key(spec.key) == STAGE_IO_MANAGER,
                 dict(said.split("=") for said in str(spec.metadata.get(METHODS_KEY, "")).split()),
+                str(spec.metadata.get(ONLY_FOR_KEY, "")),
+                KEEPS_KEY in spec.metadata,
             )
     ordered: dict[str, Node] = {}
     while len(ordered) < len(found):
@@ -113,6 +120,11 @@ class Freshness:
         self._lake = lake
         self._studio = studio
         self._stamps: dict[tuple[str, str], Stamp | None] = {}
+        self._asked: set[str] = set()
+
+    def ask(self, group: str) -> None:
+        """Count the assets of a group made on demand among those there should be."""
+        self._asked.add(group)
 
     @cached_property
     def sources(self) -> Sources:
@@ -151,11 +163,23 @@ class Freshness:
     def partitions(self, asset: str) -> list[str]:
         """Partitions of an asset there should be; of what only dances are made from, those of songs danced so."""
         node = self.assets[asset]
+        if node.group in ON_DEMAND and not self._is_asked(node.group):
+            return []
         found = self.keys(node.kind)
+        if node.only_for and not self.is_used(node.only_for):
+            return []
         if node.group != "dance" or node.kind != "song":
             return found
         danced = {k.split("|")[0] for k in self.keys("dance") if asset in self.needed_for(k)}
         return [key for key in found if key in danced | set(self._lake.keys(asset))]
+
+    def _is_asked(self, group: str) -> bool:
+        return group in self._asked or any(self._lake.keys(n.name) for n in self.assets.values() if n.group == group)
+
+    def is_used(self, method: str) -> bool:
+        """Whether a method is used: a dance by it was asked for, or there are performances for it to learn from."""
+        danced = any(base_method(key.split("|")[-1]) == method for key in self.keys("dance"))
+        return danced or (method == "hmm" and bool(self.sources.performed_songs))
 
     def needed_for(self, key: str) -> set[str]:
         """Assets a dance is made from, its own included: those of the other methods are not."""
@@ -223,6 +247,15 @@ class Freshness:
         """Whether an asset of one kind reads all partitions of another, not its own."""
         return of != "whole" and of != kind and not (kind == "dance" and of == "song")
 
+    def input_pairs(self, asset: str, key: str) -> set[tuple[str, str]]:
+        """List the partitions that a partition is made from, as (asset, partition)."""
+        node = self.assets[asset]
+        return {
+            (name, k)
+            for name in node.inputs_of(key)
+            for k in self._input_keys(node.kind, self.assets[name].kind, name, key)
+        }
+
     def _input_keys(self, kind: Kind, of: Kind, name: str, key: str) -> Sequence[str]:
         if of == "whole":
             return [""]
@@ -249,7 +282,9 @@ class Freshness:
             return Finding(asset, key, "stale", f"code version {stamp.code_version} is now {node.code_version}")
         if stamp.settings != self.settings_version(asset, key):
             return Finding(asset, key, "stale", f"settings [{'], ['.join(node.settings)}] changed")
-        expected = inputs | ({"sources": self.source_version(asset, key)} if node.sources else {})
+        expected = ({} if node.keeps else inputs) | (
+            {"sources": self.source_version(asset, key)} if node.sources else {}
+        )
         changed = sorted(name for name in expected if stamp.inputs.get(name) != expected[name])
         if changed:
             return Finding(asset, key, "stale", f"{', '.join(changed)} changed")
@@ -264,11 +299,16 @@ class Freshness:
         return all(self.state(n.name, key).state == "fresh" for n in self.assets.values() if n.kind == "dance")
 
     def findings(
-        self, groups: Iterable[str] | None = None, *, given_up: Collection[tuple[str, str]] = ()
+        self,
+        groups: Iterable[str] | None = None,
+        *,
+        given_up: Collection[tuple[str, str]] = (),
+        keys: Callable[[str, str], bool] | None = None,
     ) -> list[Finding]:
         """State of every partition of every asset, or of some groups, inputs first.
 
-        ``given_up`` are partitions that could not be made: nothing waits for them.
+        ``given_up`` are partitions that could not be made, ``keys`` says of (kind, key) which are to be made at all:
+        nothing waits for the others.
         """
         wanted = set(groups) if groups is not None else None
         found: list[Finding] = []
@@ -276,7 +316,8 @@ class Freshness:
         for node in self.assets.values():
             for key in self.partitions(node.name):
                 finding = self.state(node.name, key, pending=pending)
-                if finding.state != "fresh" and (node.name, key) not in given_up:
+                is_coming = (keys is None or keys(node.kind, key)) and (node.name, key) not in given_up
+                if finding.state != "fresh" and is_coming:
                     pending.add((node.name, key))
                 if wanted is None or node.group in wanted:
                     found.append(finding)

@@ -9,7 +9,7 @@ from schemas.table import Column, Table
 
 CHOREOGRAPHY = Table(
     name="choreography",
-    version=1,
+    version=2,
     meaning="One step: an interval of the song danced with an interval of a clip.",
     key=("song_id", "method_name", "step_index"),
     columns=(
@@ -34,6 +34,9 @@ CHOREOGRAPHY = Table(
         Column("repetition_cost", pa.float32(), "Cost of showing again what was shown."),
         Column("diversity_cost", pa.float32(), "Cost of showing what the better dances of the song show."),
         Column("wish_cost", pa.float32(), "Cost of soft wishes that are not kept."),
+        Column("state_index", pa.int32(), "Basic motion danced, by the model; -1 in other methods."),
+        Column("model_cost", pa.float32(), "Minus log probability of the motion and its length after the one before."),
+        Column("music_cost", pa.float32(), "Minus log likelihood of the music heard during the motion."),
     ),
 )
 

@@ -22,6 +22,11 @@ STATE = Column("state", pa.string(), "Whether the source was read or refused.", 
 REASON = Column("reason", pa.string(), "Why it was refused, one sentence; null when it was read.", is_optional=True)
 DURATION_S = Column("duration_s", pa.float64(), "Length; 0 when refused.")
 
+LABEL = Column("label", pa.string(), "What is danced or done, from clips.csv or the folder's name.")
+IS_LABELLED = Column("is_labelled", pa.bool_(), "Whether clips.csv says the label; else it is the folder's name.")
+STYLE = Column("style", pa.string(), "How it is done, from clips.csv; empty when not said.")
+LICENCE = Column("licence", pa.string(), "Licence of the recording, from clips.csv; empty when not said.")
+
 FRAME_INDEX = Column("frame_index", pa.int32(), "Frame of its clip or dance, from 0.")
 TIME_S = Column("time_s", pa.float64(), "Time from the clip's first frame or the song's first decoded sample.")
 ROOT_XYZ_M = Column("root_xyz_m", VECTOR, "World position of the root joint.")

@@ -90,3 +90,31 @@ MUSIC_SEGMENT = Table(
         Column("novelty_ratio", pa.float32(), "How much the music changes at the start, against its largest change."),
     ),
 )
+
+PERCUSSION = Table(
+    name="percussion",
+    version=1,
+    meaning="One stroke of a drum, or one onset of a band of audio, as General MIDI names it.",
+    key=("song_id", "hit_index"),
+    columns=(
+        f.SONG_ID,
+        Column("hit_index", pa.int32(), "Stroke of its song, from 0, by time, then key."),
+        f.TIME_S,
+        Column("key_number", pa.int32(), "Percussion key, 35 to 81; 36, 38 or 42 for the low, middle or high band."),
+        Column("velocity", pa.int32(), "How hard, 1 to 127."),
+        Column("heard_as", pa.string(), "Whether drums are told apart or only bands.", values=("drums", "bands")),
+    ),
+)
+
+MELODY = Table(
+    name="melody",
+    version=1,
+    meaning="One step of the melody of a MIDI song: how it goes from the note before.",
+    key=("song_id", "note_index"),
+    columns=(
+        f.SONG_ID,
+        Column("note_index", pa.int32(), "Step of its song, from 0."),
+        f.TIME_S,
+        Column("contour_index", pa.int32(), "0 leap down, 1 step down, 2 same, 3 step up, 4 leap up."),
+    ),
+)

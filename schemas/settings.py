@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from schemas.options import check, key
 from schemas.pins import PinWish
 
-METHODS = ("graph", "matching")
+METHODS = ("graph", "matching", "hmm")
 """Ways to choose a choreography; the first is the usual one."""
 
 
@@ -152,12 +152,70 @@ class MatchPathSettings(_Checked):
 
 
 @dataclass(frozen=True)
+class SearchSettings(_Checked):
+    """How motions are made searchable."""
+
+    has_travel: bool = key(True, "Where the root goes and turns counts; false: a walk on the spot is a walk.")
+    window_s: float = key(4.0, "Length of the windows long clips are searched by.", least=0.5, most=8)
+    longest_whole_s: float = key(6.0, "A clip no longer than this is one window.", least=0.5, most=16)
+    labels: str = key(
+        "clips.csv",
+        "What the encoder learns from: labels of 'clips.csv', 'folders' too, or 'none'.",
+        values=("clips.csv", "folders", "none"),
+    )
+    training_windows: int = key(4000, "Windows the encoder learns from at most.", least=2, most=100000)
+    training_steps: int = key(250, "Steps of its training at most.", least=1, most=100000)
+    seed: int = key(0, "Where its training begins; another seed, another encoder.", least=0)
+
+
+@dataclass(frozen=True)
+class BasicMotionSettings(_Checked):
+    """How clips are cut into motions, and these sorted into kinds."""
+
+    states: int = key(0, "Kinds of motions; 0: chosen by how clearly they differ.", least=0, most=200)
+    shortest_s: float = key(0.25, "No motion is shorter.", least=0.1, most=1.0)
+    longest_s: float = key(2.0, "No motion is longer.", least=1.0, most=8.0)
+    seed: int = key(0, "Where the clusters start.", least=0)
+
+
+@dataclass(frozen=True)
+class ChoreographyModelSettings(_Checked):
+    """How the model of the dancer is counted."""
+
+    subject: str = key("", "Learn from performances of this subject alone (clips.csv); empty for all.")
+    smoothing: float = key(0.0, "Added to every count; 0: chosen on performances held out.", least=0, most=100)
+    symbols: str = key(
+        "product",
+        "'product': all drums of a motion, each by itself; 'single': the loudest, as the document.",
+        values=("product", "single"),
+    )
+    melody_weight: float = key(0.5, "How much the way the melody goes counts against the drums.", least=0, most=10)
+
+
+@dataclass(frozen=True)
+class HmmPathSettings(_Checked):
+    """What a dance by the model costs where the model leaves a choice."""
+
+    seam_weight: float = key(1.0, "Weight of seams between unlike poses.", least=0)
+    warp_weight: float = key(1.0, "Weight of leaving a motion's own pace.", least=0)
+    repetition_weight: float = key(1.0, "Weight of showing the same recording again.", least=0)
+    temperature: float = key(
+        0.0, "0: the most probable dance; 1: one drawn as the dancer would; --temperature overrides.", least=0, most=10
+    )
+
+
+@dataclass(frozen=True)
 class DanceSettings(_Checked):
     """What a dance looks like on disk."""
 
     frame_rate_hz: float = key(30.0, "Frames a second of the stage.", least=1, most=240)
     blend_s: float = key(
         0.4, "Song time over which two clips are blended, centred on the beat of the seam.", least=0, most=2
+    )
+    blend_shape: str = key(
+        "slerp",
+        "'slerp' (eased), 'linear_slerp' (the document's) or 'inertial' (springs both ways): docs/seams.md.",
+        values=("slerp", "linear_slerp", "inertial"),
     )
     lock_feet: bool = key(True, "Keep feet where they stand: root and legs give way to contacts of the clips.")
 
@@ -191,6 +249,10 @@ class Settings:
     music_segment: MusicSegmentSettings = field(default_factory=MusicSegmentSettings)
     matching: MatchingSettings = field(default_factory=MatchingSettings)
     match_path: MatchPathSettings = field(default_factory=MatchPathSettings)
+    search: SearchSettings = field(default_factory=SearchSettings)
+    basic_motion: BasicMotionSettings = field(default_factory=BasicMotionSettings)
+    choreography_model: ChoreographyModelSettings = field(default_factory=ChoreographyModelSettings)
+    hmm_path: HmmPathSettings = field(default_factory=HmmPathSettings)
     dance: DanceSettings = field(default_factory=DanceSettings)
     opencl: OpenClSettings = field(default_factory=OpenClSettings)
 

@@ -51,6 +51,7 @@ TESTED_ELSEWHERE = {
     "assets/graph.py",
     "assets/matching.py",
     "assets/motion.py",
+    "assets/search.py",
     "assets/music.py",
     "assets/partitions.py",
     "assets/formats/errors.py",
@@ -65,6 +66,7 @@ TESTED_ELSEWHERE = {
     "pipelines/progress.py",
     "pipelines/resources.py",
     "pipelines/schedules.py",
+    "pipelines/searchable.py",
     "schemas/calibration.py",
     "schemas/choreography.py",
     "schemas/fields.py",
@@ -72,6 +74,7 @@ TESTED_ELSEWHERE = {
     "schemas/matching.py",
     "schemas/motion.py",
     "schemas/music.py",
+    "schemas/search.py",
     "schemas/usd.py",
 }
 

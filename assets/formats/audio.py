@@ -25,6 +25,7 @@ MOST_VALUES = 2**28
 SLOWEST_HZ, FASTEST_HZ = 4000, 768_000
 BLOCK_FRAMES = 1 << 18
 UNSTATED = (0, 0xFFFFFFFF)
+LARGEST_OGG_PAGE = 65_307
 
 SUFFIXES = {
     "WAV": {".wav", ".wave"},
@@ -131,9 +132,9 @@ def read(path: Path, *, limit_s: float = LONGEST_S) -> Audio:
 
     Notes
     -----
-    A file that ends before its stated length (WAV, AIFF, FLAC, MP3 with a length tag) is refused: it is a copy broken
-    off or still going on. Files that state no length (Ogg, streamed WAV, MP3 without a tag) are decoded to where they
-    end, so a cut there cannot be told.
+    A file that ends before its stated length (WAV, AIFF, FLAC, MP3 with a length tag) or within a page (Ogg, RFC 3533)
+    is refused: it is a copy broken off or still going on. Files that state no length (streamed WAV, MP3 without a tag)
+    are decoded to where they end, so a cut there cannot be told, nor one of Ogg between two pages.
     """
     with _opened(path) as sound:
         header = _header(sound, path)
@@ -142,6 +143,10 @@ def read(path: Path, *, limit_s: float = LONGEST_S) -> Audio:
         if header.n_frames > most or header.n_frames * header.n_channels > most_values:
             raise _too_long(path, header, header.n_frames, limit_s, most_values)
         stated = _stated_frames(sound, path, header)
+        if header.format_name.startswith("OGG") and _is_within_page(path):
+            raise FormatError(
+                str(path), 0, "want whole Ogg pages, got a file that ends within one: cut short; copy it again"
+            )
         blocks: list[NDArray[np.float32]] = []
         n_frames = 0
         while n_frames <= most:
@@ -183,7 +188,8 @@ def format_wav(audio: Audio) -> bytes:
     Parameters
     ----------
     audio : Audio
-        Samples beyond full scale are clipped; 16-bit samples that were decoded come back unchanged.
+        Where a sample lies beyond full scale (decoded MP3s often do) the whole song is turned down until none does;
+        16-bit samples that were decoded come back unchanged.
 
     Returns
     -------
@@ -198,7 +204,8 @@ def format_wav(audio: Audio) -> bytes:
     n_channels, rate = audio.samples.shape[1], audio.sample_rate_hz
     if audio.samples.size * 2 > 0xFFFFFF00:
         raise ValueError(f"samples: want at most 4 GiB of WAV, got {audio.samples.size * 2} bytes")
-    body: bytes = np.clip(np.rint(audio.samples * 32768.0), -32768, 32767).astype("<i2").tobytes()
+    peak = max(float(audio.samples.max()), -float(audio.samples.min()), 1.0)
+    body: bytes = np.clip(np.rint(audio.samples * (32768.0 / peak)), -32768, 32767).astype("<i2").tobytes()
     form = struct.pack("<HHIIHH", 1, n_channels, rate, rate * n_channels * 2, n_channels * 2, 16)
     if n_channels > 2:
         pcm_guid = bytes.fromhex("0100000000001000800000aa00389b71")
@@ -281,6 +288,18 @@ def _data_chunk(file: BinaryIO) -> tuple[int, int]:
             return size, end - at - 8
         at += 8 + size + (size & 1)
     return 0, 0
+
+
+def _is_within_page(path: Path) -> bool:
+    """Whether an Ogg file ends before its last page does (RFC 3533, section 6)."""
+    with path.open("rb") as file:
+        file.seek(max(0, file.seek(0, 2) - 2 * LARGEST_OGG_PAGE))
+        end = file.read()
+    at = end.rfind(b"OggS")
+    if at < 0 or at + 27 > len(end):
+        return at >= 0
+    sizes = end[at + 27 : at + 27 + end[at + 26]]
+    return len(end) < at + 27 + end[at + 26] + sum(sizes)
 
 
 def _too_long(path: Path, header: AudioHeader, n_frames: int, limit_s: float, most_values: int) -> FormatError:

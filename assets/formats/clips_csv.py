@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import difflib
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from assets.formats.errors import FormatError
 
@@ -17,17 +19,27 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "style": ("style", "kind"),
     "subject": ("subject", "person", "performer", "actor"),
     "licence": ("licence", "license"),
+    "performed_to": ("performed_to",),
+    "performed_offset_s": ("performed_offset_s", "offset_s"),
 }
 
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of one clip; empty texts where nothing was said."""
+    """What is known of one clip; empty texts where nothing was said.
+
+    ``is_labelled`` is false where the label only stands in for one that was not said.
+    ``performed_to`` is the song it was danced to (key, file name or stem; ``none`` for no song of the studio),
+    ``performed_offset_s`` the time of the song at the clip's first frame.
+    """
 
     label: str = ""
     style: str = ""
     subject: str = ""
     licence: str = ""
+    performed_to: str = ""
+    performed_offset_s: float = 0.0
+    is_labelled: bool = True
 
 
 def is_clips_csv(name: str) -> bool:
@@ -54,7 +66,7 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
     Raises
     ------
     FormatError
-        If it is not UTF-8, has no file column, or names a file twice with different facts.
+        If it is not UTF-8, has no file column, names a file twice with different facts, or an offset is no number.
     """
     try:
         text = data.decode("utf-8-sig")
@@ -74,12 +86,24 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
             file = (row.get(chosen["file"]) or "").strip().replace("\\", "/")
             if not file:
                 continue
-            said = Facts(**{k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"})
+            texts: dict[str, Any] = {k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"}
+            offset_s = _seconds(texts.pop("performed_offset_s", ""), path, rows.line_num)
+            said = Facts(**texts, performed_offset_s=offset_s)
             if facts.setdefault(file, said) != said:
                 raise FormatError(path, rows.line_num, f"want each file once, got {file!r} again with other facts")
     except csv.Error as error:
         raise FormatError(path, rows.line_num, f"want comma-separated values, got {error}") from error
     return facts
+
+
+def _seconds(text: str, path: str, line: int) -> float:
+    try:
+        value = float(text or 0.0)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise FormatError(path, line, f"want performed_offset_s in seconds, got {text!r}; write a number such as 1.25")
+    return value
 
 
 def misspelt_columns(data: bytes) -> dict[str, str]:

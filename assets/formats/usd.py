@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pxr import Gf, Kind, Sdf, Tf, Usd, UsdGeom, UsdMedia, UsdShade, UsdSkel, Vt
 
-from assets.formats import beside, usd_read
+from assets.formats import beside, usd_lineage, usd_read
 from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.types import Clip, Float, Skeleton
@@ -44,6 +44,7 @@ def write_stage(
     audio: str | None = None,
     provenance: Mapping[str, object] | None = None,
     title: str = "dance",
+    lineage: usd_lineage.Frames | None = None,
 ) -> None:
     """Write a clip as a USD stage with a body to look at.
 
@@ -57,11 +58,13 @@ def write_stage(
         Goes to the default prim's customData. Mappings, texts, numbers, truths and lists of one kind are kept as such,
         anything else as its JSON text. No dates, please: the same dance gives the same bytes.
     title : name in assetInfo
+    lineage : F values by the names of :data:`schemas.usd.LINEAGE`, or None
+        Where each frame comes from.
 
     Raises
     ------
     ValueError
-        If the suffix, the clip, the audio path or the provenance does not fit.
+        If the suffix, the clip, the audio path, the provenance or the lineage does not fit.
     OSError
         If the file cannot be written; what stood at ``path`` before still stands.
     """
@@ -83,8 +86,12 @@ def write_stage(
     _write_extent(stage, clip, shape)
     if audio is not None:
         _write_audio(stage, audio)
+    if lineage is not None and any(len(values) != clip.n_frames for values in lineage.values()):
+        raise ValueError(f"lineage: want a value a frame, {clip.n_frames}, got {[len(v) for v in lineage.values()]}")
     with Sdf.ChangeBlock():
         write_animation(layer, clip)
+        if lineage is not None:
+            usd_lineage.write_lineage(layer, contract.ANIMATION_PATH, lineage)
     with written_beside(path) as partial:
         save(layer, partial)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Ar, Usd, UsdGeom, UsdMedia, UsdSkel
 
-from assets.formats import usd_read
+from assets.formats import usd_lineage, usd_read
 from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float
 from schemas import usd as contract
@@ -260,6 +261,24 @@ def _provenance(stage: Usd.Stage) -> Iterator[Finding]:
             yield _error("provenance", where, f"{key}: want nothing that names one machine, got {value}")
 
 
+def _lineage(stage: Usd.Stage) -> Iterator[Finding]:
+    """Ask where each frame comes from: none at all is a warning, half of it an error."""
+    prim, root = _animation_prim(stage), stage.GetDefaultPrim()
+    if prim is None or not stage.GetEndTimeCode() >= stage.GetStartTimeCode():
+        return
+    stored = root.GetCustomDataByKey(contract.PROVENANCE_KEY) if root else None
+    told = stored.get("clips") if isinstance(stored, dict) else None
+    try:
+        clips = [clip["clip_id"] for clip in json.loads(told)] if isinstance(told, str) else None
+    except (ValueError, KeyError, TypeError):
+        clips = None
+    is_there = any(prim.GetAttribute(name) for name in contract.LINEAGE)
+    span = np.arange(stage.GetStartTimeCode(), stage.GetEndTimeCode() + 1)
+    say = _error if is_there else _warning
+    for sentence in usd_lineage.troubles(prim, span, clips) if is_there else ["odori:clip: want lineage, got none"]:
+        yield say("lineage", str(prim.GetPath()), sentence)
+
+
 def _texts(value: object, name: str) -> Iterator[tuple[str, str]]:
     """Find every text in customData with its key."""
     if isinstance(value, dict):
@@ -335,4 +354,5 @@ RULES: tuple[Callable[[Usd.Stage], Iterator[Finding]], ...] = (
     _body,
     _song,
     _provenance,
+    _lineage,
 )

@@ -14,10 +14,12 @@ from kernels.opencl.match_program import Program
 from kernels.opencl.match_stages import Stages, wants_safe
 from kernels.opencl.match_tables import Tables
 
-_SEGMENTS = 8
-_CLIPS = 48
+_SEGMENTS = 32
+_CLIPS = 320
 _SPARSE = 0.5
-_TURNS = 4
+_TURNS = 3
+_HOPELESS = 1.5  # times the least so far: no further turn
+_SURE_S = 0.1  # long enough to need no further turn
 
 
 def worth_trying(segments: NDArray[np.float64], n_frames: NDArray[np.int64]) -> list[Plan]:
@@ -73,18 +75,28 @@ def pick_plan(
     is_safe = any(wants_safe(tables, float(segments[i].max())) is not False for i in some)
     k_sample = max(round(k * len(few) / len(clips)), 1)
     floor = np.full(len(some), -1, np.float32)
-    tried = []
+    tried, warm = [], []
     for plan in plans:
         tables.build(plan)
-        tried.append(
-            Stages(tables, segments[some], n_frames=n_frames[some], plan=plan, is_safe=is_safe, by_level=by_level)
-        )
-    # turn by turn, for what else the machine does comes and goes; the first turn compiles
+        for stages, chosen in ((tried, some), (warm, some[:2])):
+            stages.append(
+                Stages(
+                    tables, segments[chosen], n_frames=n_frames[chosen], plan=plan, is_safe=is_safe, by_level=by_level
+                )
+            )
+    for stages in warm:  # compiles
+        finalists(stages, k=k_sample, floor=floor[:2])
+    # turn by turn, for what else the machine does comes and goes. On a CPU the time of this process alone counts,
+    # others may want the machine too
+    now = time.process_time if program.is_cpu else time.perf_counter
     spent = np.full(len(plans), np.inf)
-    for turn in range(_TURNS + 1):
+    for turn in range(_TURNS):
         for i, stages in enumerate(tried):
-            start = time.perf_counter()
+            if turn > 0 and spent[i] > _HOPELESS * spent.min():
+                continue
+            start = now()
             finalists(stages, k=k_sample, floor=floor)
-            if turn > 0:
-                spent[i] = min(spent[i], time.perf_counter() - start)
+            spent[i] = min(spent[i], now() - start)
+        if spent.min() > _SURE_S:
+            break
     return plans[int(np.argmin(spent))]

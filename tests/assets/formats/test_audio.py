@@ -121,11 +121,15 @@ def test_file_cut_short_is_refused(tmp_path, tone, name):
     assert "cut short" in what or "broken after" in what
 
 
-def test_cut_ogg_states_no_length_and_is_decoded_to_its_end(tmp_path):
+def test_ogg_cut_within_a_page_is_refused_and_between_pages_decoded_to_its_end(tmp_path):
     noise = np.random.default_rng(0).uniform(-0.5, 0.5, (10 * RATE, 1))
     path = write(tmp_path / "a.ogg", noise, format="OGG", subtype="VORBIS")
     data = path.read_bytes()
-    path.write_bytes(data[: len(data) // 2])
+    page = data.index(b"OggS", len(data) // 2)
+    for end in (page - 1, page + 4, page + 27, page + 100):
+        path.write_bytes(data[:end])
+        assert "ends within one: cut short" in refusal(path)
+    path.write_bytes(data[:page])
     assert 2.0 < audio.read(path).duration_s < 8.0
 
 
@@ -171,9 +175,10 @@ def test_written_wav_reads_back(tmp_path, tone):
     assert [path.name for path in tmp_path.iterdir()] == ["a.wav"]
 
 
-def test_loud_samples_are_clipped(tmp_path):
-    audio.write_wav(tmp_path / "a.wav", Audio(np.array([[3.0], [-3.0]], np.float32), RATE))
-    np.testing.assert_allclose(audio.read(tmp_path / "a.wav").samples, [[1.0], [-1.0]], atol=2**-14)
+def test_a_song_beyond_full_scale_is_turned_down_whole(tmp_path):
+    samples = np.array([[3.0], [1.5], [-3.0], [0.0]], np.float32)
+    audio.write_wav(tmp_path / "a.wav", Audio(samples, RATE))
+    np.testing.assert_allclose(audio.read(tmp_path / "a.wav").samples, samples / 3.0, atol=2**-14)
 
 
 @pytest.mark.parametrize(

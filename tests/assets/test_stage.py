@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assets.dance import _sound
 from assets.formats import audio
 from assets.formats.audio import Audio
 from assets.formats.errors import FormatError
+from assets.stage import _sound
 from schemas.settings import Limits, Settings
 
 

@@ -1,0 +1,169 @@
+"""Which recorded motion is danced for each basic motion of a path: smooth seams, own pace, not always the same one.
+
+The model says which basic motion is danced when; of each there are many recordings. One goes best with those before and
+after it: best of all one that simply goes on in the same clip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kernels.hmm.durations import LEAST_WARP, MOST_WARP
+from kernels.matching.path import viterbi
+from kernels.types import Float, Int
+
+EASY_WARP = (0.9, 1.1)
+HARD_COST = 4.0
+"""Added where the pace is beyond the easy bounds: as much as several rough seams."""
+
+LONGEST_RUN = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Recorded motions that may be danced, sorted by clip, then start; (I,) each.
+
+    Parameters
+    ----------
+    clip_index, state : int64
+    start_s, end_s : float64, seconds of the clip
+    """
+
+    clip_index: Int
+    state: Int
+    start_s: Float
+    end_s: Float
+
+    @property
+    def following(self) -> Int:
+        """Motion that goes on where each ends, in the same clip; -1 for none."""
+        if not len(self.state):
+            return np.zeros(0, np.int64)
+        goes_on = (self.clip_index[1:] == self.clip_index[:-1]) & (np.abs(self.start_s[1:] - self.end_s[:-1]) < 1e-6)
+        return np.where(np.append(goes_on, False), np.arange(len(self.state)) + 1, -1)
+
+
+def warp_cost(span_s: Float, motion_s: Float) -> Float:
+    """Cost of leaving a motion's own pace: squared, 1 at ten per cent, and more beyond the easy bounds."""
+    warp = span_s / motion_s
+    easy = (warp >= EASY_WARP[0] - 1e-9) & (warp <= EASY_WARP[1] + 1e-9)
+    return np.asarray((np.log(warp) / np.log(1.1)) ** 2 + np.where(easy, 0.0, HARD_COST), np.float64)
+
+
+def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24) -> list[Int]:
+    """Find motions for each step of a path: those that can be danced on end, and those nearest to their own pace.
+
+    Parameters
+    ----------
+    motions : Motions
+    state : (S,) int64, basic motion of each step
+    span_s : (S,) float, seconds of song each takes
+    most : int, >= 2
+
+    Returns
+    -------
+    S arrays of motions, each increasing, none empty
+
+    Raises
+    ------
+    ValueError
+        If a step has no motion within the warp bounds.
+    """
+    length = motions.end_s - motions.start_s
+    after = motions.following
+    before = np.full(len(after), -1, np.int64)
+    before[after[after >= 0]] = np.flatnonzero(after >= 0)
+    fits = [np.flatnonzero(_fits(motions, length, s, t)) for s, t in zip(state.tolist(), span_s.tolist(), strict=True)]
+    if any(not len(f) for f in fits):
+        first = next(i for i, f in enumerate(fits) if not len(f))
+        raise ValueError(f"step {first}: no motion of state {state[first]} lasts about {span_s[first]:.2f} s")
+    ahead = _runs(fits[::-1], after, len(length))[::-1]
+    behind = _runs(fits, before, len(length))
+    found = []
+    for step, here in enumerate(fits):
+        cost = warp_cost(span_s[step], length[here])
+        run = ahead[step] + behind[step]
+        by_run = np.lexsort((here, cost, -run))
+        by_pace = np.lexsort((here, cost))
+        picked = list(dict.fromkeys([*by_run[: most // 2].tolist(), *by_pace[:most].tolist()]))[:most]
+        found.append(np.sort(here[picked]))
+    return found
+
+
+def _fits(motions: Motions, length: Float, state: int, span_s: float) -> Int:
+    warp = span_s / length
+    return np.asarray((motions.state == state) & (warp >= LEAST_WARP) & (warp <= MOST_WARP))
+
+
+def _runs(fits: Sequence[Int], after: Int, n: int) -> list[Int]:
+    """How many steps each motion of a step can go on without a seam, in the order in which steps come in."""
+    out: list[Int] = []
+    run = np.zeros(n + 1, np.int64)
+    for here in fits:
+        now = np.zeros(n + 1, np.int64)
+        now[here] = np.minimum(run[after[here]] + 1, LONGEST_RUN)  # -1 reads the spare last place, always 0
+        run = now
+        out.append(now[here])
+    return out
+
+
+def choose(
+    candidates: Sequence[Int],
+    own: Sequence[Float],
+    between: Sequence[Float],
+    *,
+    repetition_weight: float = 1.0,
+    rounds: int = 12,
+) -> tuple[Int, Float, float]:
+    """Choose one motion a step: the cheapest sequence, with what is shown again priced.
+
+    Parameters
+    ----------
+    candidates : S arrays of motions, S >= 1
+    own : S arrays, cost of each candidate, >= 0
+    between : S - 1 arrays (N_i, N_i+1), cost of each seam
+    repetition_weight : float, >= 0
+        Cost of every showing of a motion after its first.
+    rounds : int, >= 0
+
+    Returns
+    -------
+    choice : (S,) int64, candidate of each step
+    repetition_cost : (S,) float64
+    total_cost : float
+
+    Notes
+    -----
+    Repetition is no sum over neighbours, so it is priced in rounds: motions shown more than once become dearer, and
+    the best sequence found, by its true cost, is kept.
+    """
+    n = int(max(c.max() for c in candidates)) + 1
+    price = np.zeros(n)
+    best = np.inf, np.zeros(0, np.int64), np.zeros(0)
+    for _ in range(rounds + 1 if repetition_weight > 0 else 1):
+        choice = viterbi([o + price[c] for o, c in zip(own, candidates, strict=True)], between)
+        shown = np.array([c[i] for c, i in zip(candidates, choice, strict=True)], np.int64)
+        again = repetition_weight * _times_before(shown)
+        total = float(
+            sum(o[i] for o, i in zip(own, choice, strict=True))
+            + sum(b[i, j] for b, i, j in zip(between, choice[:-1], choice[1:], strict=True))
+            + again.sum()
+        )
+        if total < best[0] - 1e-9:
+            best = total, choice, again
+        uses = np.bincount(shown, minlength=n)
+        price = price + 0.25 * repetition_weight * np.maximum(uses - 1, 0)
+    return best[1], best[2], best[0]
+
+
+def _times_before(shown: Int) -> Float:
+    """How often each motion was shown before, capped at 4."""
+    seen: dict[int, int] = {}
+    out = np.zeros(len(shown))
+    for i, motion in enumerate(shown.tolist()):
+        out[i] = min(seen.get(motion, 0), 4)
+        seen[motion] = seen.get(motion, 0) + 1
+    return out
