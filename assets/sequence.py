@@ -102,7 +102,7 @@ def load_matches(
     *,
     may_dance: Container[str],
 ) -> LoadedMatches:
-    """Read a song's matches and the clips they name that may be danced; where a segment has none, the longest clips as well.
+    """Read a song's matches and the clips they name that may be danced; where there are none, the longest clips too.
 
     Parameters
     ----------
