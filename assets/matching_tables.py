@@ -195,7 +195,12 @@ class StoredMatches:
     mutual_ratio: Float
 
     def only(self, kept: Sequence[bool]) -> StoredMatches:
-        """Take some of them, by (N,) truths."""
+        """Take some of them.
+
+        Parameters
+        ----------
+        kept : N truths
+        """
         mask = np.array(kept, bool)
         return StoredMatches(
             tuple(itertools.compress(self.clip_ids, mask)),
