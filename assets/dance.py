@@ -1,6 +1,7 @@
 """From a choreography to a finished dance: poses, lineage, quality."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import dagster as dg
 import numpy as np
@@ -16,22 +17,27 @@ from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.quality import Measure
-from kernels.skeleton.canonical import CANONICAL
+from kernels.skeleton.canonical import CANONICAL, mirror
 from kernels.types import Choreography, Clip
 from schemas.choreography import DANCE_POSE, DANCE_QUALITY, FRAME_LINEAGE
+from schemas.keys import mirrored, source_clip
 
 _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 
 
 def load_clips(canonical_pose: Stored, steps: Choreography) -> dict[str, Clip]:
     """Read the canonical clips a choreography dances, and no others."""
-    wanted = set(steps.clip_id)
+    names = set(steps.clip_id)
+    wanted = {source_clip(name) for name in names}
     found: dict[str, Clip] = {}
     for key in canonical_pose.keys:
         here = wanted & set(canonical_pose.stamp(key).clips)
         if here:
             for moved in tables.to_canonical_poses(canonical_pose.read(key, clip_ids=here)):
-                found[moved.clip_id] = Clip(CANONICAL, moved.frame_rate_hz, moved.root_xyz_m, moved.rotation_wxyz)
+                images = {moved.clip_id: (moved.root_xyz_m, moved.rotation_wxyz)}
+                if mirrored(moved.clip_id) in names:
+                    images[mirrored(moved.clip_id)] = mirror(moved.root_xyz_m, moved.rotation_wxyz)
+                found |= {name: Clip(CANONICAL, moved.frame_rate_hz, *motion) for name, motion in images.items()}
     return found
 
 
@@ -110,8 +116,11 @@ def dance_quality(
         "beats": [*quality.lag_measures(dance, steps, beat_s), *quality.beat_measures(dance, beat_s)],
         "warp": quality.warp_measures(steps),
         "seams": seam_quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
-        "feet": foot_quality.foot_measures(dance, steps, clips),
-        "catalogue": quality.catalogue_measures(steps, _seconds(clip)),
+        "feet": [
+            *foot_quality.foot_measures(dance, steps, clips),
+            *foot_quality.knee_measures(dance, steps, clips),
+        ],
+        "catalogue": quality.catalogue_measures(_of_sources(steps), _seconds(clip)),
     }
     progress.step()
     every = [measure for measures in found.values() for measure in measures]
@@ -132,6 +141,11 @@ def _check(name: str, measures: list[Measure]) -> dg.AssetCheckResult:
         severity=dg.AssetCheckSeverity.WARN,
         metadata={m.name: float(m.value) for m in measures if np.isfinite(m.value)},
     )
+
+
+def _of_sources(steps: Choreography) -> Choreography:
+    """Take mirrored clips for the clips they are images of."""
+    return replace(steps, clip_id=tuple(source_clip(name) for name in steps.clip_id))
 
 
 def _seconds(clip: Stored) -> dict[str, float]:

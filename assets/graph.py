@@ -22,9 +22,11 @@ from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, 
 from kernels.graph.shortlist import nearest_of
 from kernels.graph.transitions import Transitions, blend_margin_s, connect
 from kernels.motion.velocity import accents, jerk_around
-from kernels.skeleton.canonical import JOINTS
+from kernels.skeleton.canonical import CANONICAL, JOINTS, mirror
+from kernels.skeleton.kinematics import forward
 from kernels.types import Float, MotionGraph
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
+from schemas.keys import mirrored, source_clip
 from schemas.settings import MotionGraphSettings
 
 MEMORY_VERSION = "1"
@@ -91,7 +93,7 @@ def motion_graph(
     kept = losses[settings.prune]
     index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
     ids = [b.clip_id for b in beats]
-    node = tables.from_motion_graph_node(graph, ids, index, [labels[clip] for clip in ids], kept.is_kept)
+    node = tables.from_motion_graph_node(graph, ids, index, [labels[source_clip(clip)] for clip in ids], kept.is_kept)
     edge = tables.from_motion_graph_edge(graph, ids, found.distance)
     metadata = _metadata(found, losses, settings.prune) | {
         "device": getattr(pair_distance, "name", "reference"),
@@ -128,16 +130,30 @@ def _session(
         # Not beats of an earlier build whose renewal failed.
         if clip in beats and clip in labels
     }
-    changed = [clip for clip, version in versions.items() if clip not in known or known[clip].version != version]
+    images = {clip: [clip, *([mirrored(clip)] if settings.mirror else [])] for clip in versions}
+    changed = [
+        clip
+        for clip, version in versions.items()
+        if any(name not in known or known[name].version != version for name in images[clip])
+    ]
     poses = tables.by_clip(canonical_pose.read(key, clip_ids=changed)) if changed else {}
     found = []
     for clip_id in beats:
         if clip_id in poses:
             moved = tables.to_canonical_pose(poses[clip_id])
-            found.append(_beats(moved, tables.to_numbers(beats[clip_id]["time_s"]), versions[clip_id], settings))
+            time_s = tables.to_numbers(beats[clip_id]["time_s"])
+            each = (moved, _image(moved))[: len(images[clip_id])]
+            found += [_beats(image, time_s, versions[clip_id], settings) for image in each]
         elif clip_id in versions and clip_id not in changed:
-            found.append(known[clip_id])
+            found += [known[name] for name in images[clip_id]]
     return found
+
+
+def _image(moved: tables.CanonicalClip) -> tables.CanonicalClip:
+    """Mirror a clip, left for right."""
+    root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
+    position, _ = forward(CANONICAL, root, turned)
+    return tables.CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
 
 
 def _beats(moved: tables.CanonicalClip, beat_s: Float, version: str, settings: MotionGraphSettings) -> Beats:

@@ -24,6 +24,7 @@ from kernels.music.preview import render_preview
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Choreography, Clip
 from schemas.choreography import CHOREOGRAPHY, USD_ANIMATION
+from schemas.keys import source_clip
 
 _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 
@@ -137,7 +138,9 @@ def _sound(song: Mapping[str, Any], studio: Studio) -> Audio:
 
 
 def _provenance(song: Mapping[str, Any], method: str, steps: Choreography, clip: Stored) -> dict[str, Any]:
-    danced = pl.concat([read_rows(clip.read(key, clip_ids=set(steps.clip_id))) for key in clip.keys])
+    danced = pl.concat(
+        [read_rows(clip.read(key, clip_ids={source_clip(name) for name in steps.clip_id})) for key in clip.keys]
+    )
     return {
         "method": method,
         "song": {"path": song["path"], "sha256": song["source_sha256"]},

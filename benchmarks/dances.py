@@ -48,6 +48,7 @@ def judge(studio: BuiltStudio, danced: Danced, frame_rate_hz: float) -> tuple[di
         *quality.beat_measures(dance, danced.heard_s),
         *quality.warp_measures(steps),
         *foot_quality.foot_measures(dance, steps, clips),
+        *foot_quality.knee_measures(dance, steps, clips),
     ]
     found = {m.name: m.value for m in measures}
     return found | {"step_count": len(steps.clip_id), "clip_count": len(set(steps.clip_id))}, blended, cut
@@ -64,6 +65,7 @@ def bars(rows: dict[str, dict[str, float]], blended: Float, cut: Float) -> list[
     source = of("source_foot_slide_cm_per_s") * of("planted_s")
     added = float((of("added_foot_slide_cm_per_s") * of("planted_s")).sum() / source.sum())
     sure = float((of("beat_f_p_probability") < 0.01).mean())
+    knees = percentile(of("knee_pop_ratio"), 50)
     median, worst = percentile(blended, 50), float(blended.max(initial=0.0))
     return [
         ("seam_jerk_median_ratio", "at most 1.2", median, median <= 1.2),
@@ -73,6 +75,7 @@ def bars(rows: dict[str, dict[str, float]], blended: Float, cut: Float) -> list[
         ("plain_cut_worst_ratio", "", float(cut.max(initial=0.0)), True),
         ("added_slide_ratio", "at most 0.10 of the clips' own", added, added <= 0.10),
         ("penetration_cm", "at most 1", float(of("penetration_cm").max()), bool(of("penetration_cm").max() <= 1)),
+        ("knee_pop_ratio", "median of songs, at most 1.2", knees, knees <= 1.2),
         ("warp_easy_ratio", "at least 0.95", easy, easy >= 0.95),
         ("songs_above_chance_ratio", "at least 0.80", sure, sure >= 0.80),
     ]

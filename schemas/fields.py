@@ -42,6 +42,8 @@ RHYTHM = Column("rhythm", pa.float32(), "Stops of the body, or onsets at beats, 
 INTENSITY = Column("intensity", pa.float32(), "Drive of the motion, or level of the music; the 99th percentile is 1.")
 SEGMENT_INDEX = Column("segment_index", pa.int32(), "Segment of its song, from 0.")
 
+IS_MIRRORED = Column("is_mirrored", pa.bool_(), "Whether the clip is shown mirrored, left for right.")
+
 WARP_RATIO = Column(
     "warp_ratio", pa.float32(), "Song time over clip time; above 1 the clip plays slower than recorded."
 )

@@ -17,6 +17,7 @@ MOTION_GRAPH_NODE = Table(
     columns=(
         NODE_INDEX,
         f.CLIP_ID,
+        f.IS_MIRRORED,
         f.BEAT_INDEX,
         f.TIME_S,
         Column("next_node_index", pa.int32(), "The clip's next beat; -1 at its last."),

@@ -82,6 +82,7 @@ class MotionGraphSettings(_Checked):
         0.0, "Equation 19: a transition is allowed below this ratio; 0: the built-in value.", least=0
     )
     neighbours: int = key(20, "Transitions kept for each beat.", least=1)
+    mirror: bool = key(False, "Dance clips mirrored, left for right, as well: twice the catalogue.")
     prune: str = key(
         "reach",
         "'reach' (a dance can go on for ever), 'dead_ends' (the document's), 'component' or 'none'.",

@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from kernels.assembly.blend import Dance
 from kernels.assembly.feet import clip_contacts, planted_feet
 from kernels.assembly.quality import Measure
+from kernels.assembly.seam_quality import phrases_alone
 from kernels.motion import contacts
+from kernels.motion.contacts import FootContacts
 from kernels.skeleton import grounding, kinematics
-from kernels.types import Choreography, Clip
+from kernels.skeleton.canonical import CANONICAL
+from kernels.types import Choreography, Clip, Float
 
 Bool = NDArray[np.bool_]
 
@@ -66,6 +69,59 @@ def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) 
         ),
         Measure("penetration_cm", depth_cm, "at most 1", depth_cm <= 1.0),
     ]
+
+
+def knee_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
+    """Judge the knees: a leg that is pulled straight for a foot pops.
+
+    Parameters
+    ----------
+    dance, steps, clips : as :func:`kernels.assembly.blend.assemble` has them, on the canonical skeleton
+
+    Returns
+    -------
+    list of Measure
+        How fast knees change their turning, at the one frame in a thousand where they do so most, over the same of the
+        clips at the dance's own pace; 0 for a dance too short.
+    """
+    own = [_knee_turns(position) for _, position in phrases_alone(dance, steps, clips, skeleton=CANONICAL)]
+    ours = _knee_turns(dance.position_xyz_m)
+    source = float(np.percentile(np.concatenate(own), 99.9)) if own else 0.0
+    ratio = float(np.percentile(ours, 99.9)) / source if source > 0 and len(ours) else 0.0
+    return [Measure("knee_pop_ratio", ratio, "at most 1.2", ratio <= 1.2)]
+
+
+def seam_slips(dance: Dance, steps: Choreography, planted: FootContacts) -> Float:
+    """Measure how far each foot that is planted through a seam moves over its blend.
+
+    Parameters
+    ----------
+    dance : Dance on the canonical skeleton
+    steps : Choreography it was assembled from
+    planted : FootContacts of its frames, from :func:`kernels.assembly.feet.planted_feet`
+
+    Returns
+    -------
+    (n,) float64, metres, horizontal; one for each foot whose ankle or toes stand from one end of a blend to the other
+    """
+    found = []
+    for i in np.flatnonzero(steps.has_seam & (steps.blend_s > 0)):
+        near = np.abs(dance.time_s - steps.song_start_s[i]) <= steps.blend_s[i] / 2
+        frame = np.flatnonzero(near)
+        for joints, stands in ((grounding.ANKLES, planted.ankle), (grounding.TOES, planted.toes)):
+            for side in range(2):
+                if len(frame) > 1 and stands[frame, side].all():
+                    a, b = dance.position_xyz_m[frame[0], joints[side]], dance.position_xyz_m[frame[-1], joints[side]]
+                    found.append(float(np.linalg.norm((b - a)[[0, 2]])))
+    return np.array(found)
+
+
+def _knee_turns(position_xyz_m: Float) -> Float:
+    """Size of the second differences of both knees' angles, radians a frame squared."""
+    hip, knee, ankle = (position_xyz_m[:, joints] for joints in (grounding.THIGHS, grounding.KNEES, grounding.ANKLES))
+    thigh, shin = hip - knee, ankle - knee
+    angle = np.arctan2(np.linalg.norm(np.cross(thigh, shin), axis=-1), (thigh * shin).sum(axis=-1))
+    return np.asarray(np.abs(np.diff(angle, n=2, axis=0)).ravel(), np.float64)
 
 
 def _danced_frames(dance: Dance, steps: Choreography, clip_id: str, clip: Clip) -> Bool:

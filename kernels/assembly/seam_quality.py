@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from kernels.assembly.quality import Measure
 from kernels.assembly.timing import clock
 from kernels.motion.velocity import jerk
 from kernels.skeleton import kinematics
-from kernels.types import Choreography, Clip, Float, Skeleton
+from kernels.types import Choreography, Clip, Float, Int, Skeleton
 
 
 def seam_ratios(
@@ -31,10 +31,6 @@ def seam_ratios(
     blended, cut : (S,) float64 of S seams, >= 0
         Of the dance, and of the same choreography without blends; empty without seams.
     """
-    seam = np.flatnonzero(steps.has_seam)
-    if len(seam) == 0 or len(dance.time_s) < 4:
-        return np.zeros(0), np.zeros(0)
-    reference = float(np.percentile(_source_jerk(dance, steps, clips, skeleton), 99)) or 1.0
     cut = assemble(
         replace(steps, blend_s=np.zeros_like(steps.blend_s)),
         clips,
@@ -42,13 +38,31 @@ def seam_ratios(
         frame_rate_hz=dance.frame_rate_hz,
         duration_s=float(dance.time_s[-1]) or 1.0 / dance.frame_rate_hz,
     )
-    at_s = steps.song_start_s[seam]
-    width_s = steps.blend_s[seam] / 2 + reach_s
-    blended, plain = (
-        _peaks(jerk(each.position_xyz_m, each.frame_rate_hz), each.time_s, at_s, width_s) / reference
-        for each in (dance, cut)
-    )
+    width_s = steps.blend_s[steps.has_seam] / 2 + reach_s
+    blended, plain = (peak_ratios(d, steps, clips, skeleton=skeleton, reach_s=width_s) for d in (dance, cut))
     return blended, plain
+
+
+def peak_ratios(
+    dance: Dance, steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton, reach_s: Float | float
+) -> Float:
+    """Peak jerk near each seam over the 99th percentile inside the source clips at the dance's own pace.
+
+    Parameters
+    ----------
+    dance, steps, clips, skeleton : as :func:`kernels.assembly.blend.assemble` has them
+    reach_s : (S,) float or float, seconds either side of each seam
+
+    Returns
+    -------
+    (S,) float64 of S seams, >= 0; empty without seams or in a dance of fewer than four frames
+    """
+    at_s = steps.song_start_s[steps.has_seam]
+    if len(at_s) == 0 or len(dance.time_s) < 4:
+        return np.zeros(0)
+    reference = float(np.percentile(_source_jerk(dance, steps, clips, skeleton), 99)) or 1.0
+    found = jerk(dance.position_xyz_m, dance.frame_rate_hz)
+    return _peaks(found, dance.time_s, at_s, np.broadcast_to(reach_s, at_s.shape)) / reference
 
 
 def seam_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton) -> list[Measure]:
@@ -96,15 +110,32 @@ def _peaks(values: Float, time_s: Float, at_s: Float, width_s: Float) -> Float:
 
 def _source_jerk(dance: Dance, steps: Choreography, clips: Mapping[str, Clip], skeleton: Skeleton) -> Float:
     """Jerk of every frame if its clip had gone on unblended, at the dance's own pace."""
+    found = [
+        jerk(position, dance.frame_rate_hz)[1:-2]
+        for _, position in phrases_alone(dance, steps, clips, skeleton=skeleton)
+    ]
+    return np.concatenate(found) if found else np.ones(1)
+
+
+def phrases_alone(
+    dance: Dance, steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton
+) -> Iterator[tuple[Int, Float]]:
+    """Give what the clips themselves do at the dance's own pace, phrase by phrase, without blends or locked feet.
+
+    Parameters
+    ----------
+    dance, steps, clips, skeleton : as :func:`kernels.assembly.blend.assemble` has them
+
+    Yields
+    ------
+    (n,) int64 frames of a phrase, n >= 4, and (n, J, 3) float64 joints, metres
+    """
     motion = clock(steps)
     motion_s = motion.at(dance.time_s)
     start = np.flatnonzero(np.append(True, steps.has_seam[1:]))
     end = np.append(start[1:], len(steps.clip_id))
-    found = []
     for a, b in zip(start, end, strict=True):
         frame = np.flatnonzero((dance.lineage.step_index >= a) & (dance.lineage.step_index < b))
-        if len(frame) < 4:
-            continue
-        root, rot = sample(clips[steps.clip_id[a]], steps.clip_start_s[a] + motion_s[frame] - motion.motion_s[a])
-        found.append(jerk(kinematics.forward(skeleton, root, rot)[0], dance.frame_rate_hz)[1:-2])
-    return np.concatenate(found) if found else np.ones(1)
+        if len(frame) >= 4:
+            root, rot = sample(clips[steps.clip_id[a]], steps.clip_start_s[a] + motion_s[frame] - motion.motion_s[a])
+            yield frame, kinematics.forward(skeleton, root, rot)[0]

@@ -89,18 +89,18 @@ def pick_plan(
             )
     for stages in warm:  # compiles
         finalists(stages, k=k_sample, floor=floor[:2])
-    # turn by turn, for what else the machine does comes and goes. On a CPU the time of this process alone counts,
-    # others may want the machine too
+    # turn by turn, for what else the machine does comes and goes; some drivers still compile in the first turn, for
+    # larger sizes. On a CPU the time of this process alone counts, others may want the machine too
     now = time.process_time if program.is_cpu else time.perf_counter
     spent = np.full(len(plans), np.inf)
     for turn in range(_TURNS):
         for i, stages in enumerate(tried):
-            if turn > 0 and spent[i] > _HOPELESS * spent.min():
+            if turn > 1 and spent[i] > _HOPELESS * spent.min():
                 continue
             start = now()
             finalists(stages, k=k_sample, floor=floor)
             spent[i] = min(spent[i], now() - start)
-        if spent.min() > _SURE_S:
+        if turn > 0 and spent.min() > _SURE_S:
             break
     # as good as the fastest: the one with the least memory, whose index is the sooner built
     good = [plan for plan, seconds in zip(plans, spent, strict=True) if seconds <= _AS_GOOD * spent.min()]

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from kernels.assembly.blend import assemble
-from kernels.assembly.foot_quality import foot_measures
+from kernels.assembly.feet import lock_feet, planted_feet
+from kernels.assembly.foot_quality import foot_measures, knee_measures, seam_slips
+from kernels.skeleton import grounding
 from kernels.skeleton.canonical import CANONICAL
 from kernels.synthetic.dancer import take
 
@@ -70,3 +72,26 @@ def test_sunken_feet_are_seen(phrases, dance, clips):
     found = foot_measures(sunk, steps, clips)
     assert values(found)["penetration_cm"] == pytest.approx(3.0, abs=0.2)
     assert not passed(found)["penetration_cm"]
+
+
+def test_knees_of_a_clip_alone_do_not_pop_and_a_leg_pulled_straight_for_a_frame_does(phrases, dance, clips):
+    steps = phrases(("step", 0.25, 8, 0.5, 0.5))
+    made = dance(steps)
+    assert values(knee_measures(made, steps, clips))["knee_pop_ratio"] == pytest.approx(1, abs=0.05)
+    position = made.position_xyz_m.copy()
+    position[60, grounding.KNEES] += [0.0, 0.0, 0.08]
+    found = knee_measures(replace(made, position_xyz_m=position), steps, clips)
+    assert values(found)["knee_pop_ratio"] > 3
+    assert not passed(found)["knee_pop_ratio"]
+
+
+def test_a_foot_planted_through_a_seam_stays_where_it_is(phrases, dance, clips):
+    steps = phrases(("twist", 0.25, 4, 0.55, 0.55), ("wave", 0.75, 4, 0.5, 0.5), blend_s=0.4)
+    made = dance(steps)
+    planted = planted_feet(made, steps, clips)
+    before = seam_slips(made, steps, planted)
+    after = seam_slips(lock_feet(made, planted), steps, planted)
+    assert len(before) == len(after) > 0
+    assert np.median(after) < 0.7 * np.median(before)
+    assert after.max() < 0.03
+    assert len(seam_slips(made, phrases(("twist", 0.25, 8, 0.55, 0.55)), planted)) == 0
