@@ -18,6 +18,7 @@ from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES, base_met
 from assets.sources import Request, Song
 from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
+from pipelines import hmm_report
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
 from pipelines.files import StudioError, write_beside
@@ -147,6 +148,8 @@ def dance(
     if out is not None:
         _check_out(out)
     pins = _pin_texts(pins)
+    if temperature is not None and not 0 <= temperature <= 10:
+        raise StudioError(f"--temperature: want 0 to 10, got {temperature:g}")
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
     work = _Session(studio, progress)
@@ -219,6 +222,9 @@ def _dance_json(made: list[dict[str, Any]], troubles: list[str], n_asked: int) -
 def _dance_facts(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
     folder = studio.dances / song
     report = json.loads((folder / f"{method}.json").read_text())
+    model = hmm_report.model_facts(studio.lake) if method == "hmm" else None
+    if model is not None:
+        model["notes"] += hmm_report.dance_notes(report["wanted"])
     return {
         "song": song,
         "method": method,
@@ -227,6 +233,7 @@ def _dance_facts(studio: StudioFolder, song: str, method: str) -> dict[str, Any]
         "quality": report["quality"],
         "not_as_wanted": sorted(n for n, m in report["wanted"].items() if m["is_passed"] is False),
         "pins": _pin_facts(studio, f"{song}|{method}"),
+        **({} if model is None else {"model": model}),
     }
 
 
@@ -271,6 +278,8 @@ def _dance_report(facts: dict[str, Any]) -> str:
     ]
     if facts["not_as_wanted"]:
         lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")
+    if "model" in facts:
+        lines += hmm_report.report_lines(facts["model"])
     return "\n".join(lines)
 
 
