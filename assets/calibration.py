@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from assets.formats import suit
+from assets.formats import suit, suit_columns
 from assets.formats.suit_long import Suit
 from assets.formats.suit_names import unknown_sensor
 from kernels import rotation
@@ -103,6 +103,7 @@ def calibrate_file(
     settings: CalibrationSettings,
     sensors: Mapping[str, str] | None = None,
     solvers: Solvers | None = None,
+    max_bytes: int = suit_columns.MAX_BYTES,
 ) -> Calibrated:
     """Read a recording and calibrate the body in it.
 
@@ -112,6 +113,12 @@ def calibrate_file(
     settings : the ``[calibration]`` section
     sensors : the ``[sensors]`` section: names in the file to ours
     solvers : where poses are solved; None for the NumPy references
+    max_bytes : int
+        Larger files are refused before they are read.
+
+    Returns
+    -------
+    Calibrated
 
     Raises
     ------
@@ -123,7 +130,7 @@ def calibrate_file(
         If it cannot be opened.
     """
     watch = _Watch()
-    read = watch("read", lambda: suit.read(path, sensors=sensors, unit=settings.unit))
+    read = watch("read", lambda: suit.read(path, sensors=sensors, unit=settings.unit, max_bytes=max_bytes))
     with threadpool_limits(limits=1, user_api="blas"):
         return _calibrate(read, settings, solvers, watch)
 

@@ -35,7 +35,7 @@ from schemas.motion import CLIP, POSE, SKELETON
     # Poses first: they are made one session at a time while they are stored, and leave the small tables behind.
     (POSE, SKELETON, CALIBRATION, CLIP),
     group="capture",
-    code_version="2",
+    code_version="3",
     settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,
@@ -208,6 +208,7 @@ class _Reader:
                 settings=self._settings.calibration,
                 sensors=self._settings.sensors,
                 solvers=self._solvers,
+                max_bytes=self._max_bytes,
             )
             mapping = map_joints(found.clip.skeleton, self._settings.joints)
         except (FormatError, CalibrationError, ValueError, OSError) as error:
@@ -263,6 +264,7 @@ def _row(clip: Clip, reading: dict[str, object]) -> dict[str, object]:
         "source_sha256": clip.sha256,
         "source_format": clip.kind if clip.sha256 else "",
         "label": facts.label,
+        "is_labelled": facts.is_labelled,
         "style": facts.style,
         "subject": facts.subject,
         "licence": facts.licence,

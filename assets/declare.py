@@ -15,6 +15,7 @@ warnings.filterwarnings("ignore", category=dg.BetaWarning)
 SETTINGS_KEY = "odori/settings"
 SOURCES_KEY = "odori/sources"
 METHODS_KEY = "odori/methods"
+KEEPS_KEY = "odori/keeps"
 ONLY_FOR_KEY = "odori/only_for"
 
 
@@ -31,6 +32,7 @@ def table_asset(
     methods: Mapping[str, str] | None = None,
     only_for: str = "",
     io_manager: str = "lake",
+    keeps: bool = False,
 ) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
     """Declare an asset that stores a table of its own name.
 
@@ -40,7 +42,7 @@ def table_asset(
     group : area of the asset graph
     code_version : raised by hand when the meaning of the output changes
     settings : sections of ``odori.toml`` it reads, or single keys as ``section.key``, separated by spaces
-    sources : "clips", "song" or "request" when it reads source files of its partition
+    sources : "clips", "song", "request" or "character" when it reads source files of its partition
     partitions : how it is cut; many sessions or songs are made in one run
     ins : inputs whose partitions do not match its own
     checks : asset checks it yields, by name, each with what it believes
@@ -48,13 +50,14 @@ def table_asset(
         its name; all where nothing is said
     only_for : the one method of dancing it is made for; made where that is used, see ``pipelines/freshness.py``
     io_manager : who stores it
+    keeps : once made it stays when its inputs change; only its code, its settings or a person make it anew
     """
     made: Callable[[Callable[..., Any]], dg.AssetsDefinition] = dg.asset(
         name=table.name,
         group_name=group,
         code_version=code_version,
         description=table.meaning,
-        metadata=_metadata(table, settings, sources, only_for, methods or {}),
+        metadata=_metadata(table, settings, sources, only_for, methods or {}, keeps=keeps),
         io_manager_key=io_manager,
         partitions_def=partitions,
         backfill_policy=_backfill(partitions),
@@ -106,11 +109,19 @@ def _backfill(partitions: dg.PartitionsDefinition[str] | None) -> dg.BackfillPol
 
 
 def _metadata(
-    table: Table, settings: str, sources: str, only_for: str, methods: Mapping[str, str] | None = None
+    table: Table,
+    settings: str,
+    sources: str,
+    only_for: str = "",
+    methods: Mapping[str, str] | None = None,
+    *,
+    keeps: bool = False,
 ) -> dict[str, Any]:
     said = {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
     if only_for:
         said[ONLY_FOR_KEY] = only_for
+    if keeps:
+        said[KEEPS_KEY] = "true"
     if methods:
         said[METHODS_KEY] = " ".join(f"{name}={method}" for name, method in methods.items())
     return said

@@ -1,7 +1,7 @@
 """The motion graph: which beat of which clip may follow which."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 import dagster as dg
 import numpy as np
@@ -10,20 +10,27 @@ import pyarrow as pa
 
 from assets import plots, tables
 from assets.declare import table_assets
-from assets.lineage import Part, Progress, Stored
+from assets.graph_memory import Beats, Memory, keep, near_pairs, recall
+from assets.lineage import Part, Progress, Stored, version_of
 from assets.partitions import EVERY
 from assets.sources import Studio
 from kernels import rotation
 from kernels.graph.distance import PairDistance
-from kernels.graph.features import BeatFeatures, beat_features, concatenate_beats
+from kernels.graph.features import BeatFeatures, beat_features
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
-from kernels.graph.transitions import Transitions, blend_margin_s, find_transitions
-from kernels.motion.velocity import accents
-from kernels.skeleton.canonical import JOINTS
+from kernels.graph.shortlist import nearest_of
+from kernels.graph.transitions import Transitions, blend_margin_s, connect
+from kernels.motion.velocity import accents, jerk_around
+from kernels.skeleton.canonical import CANONICAL, JOINTS, mirror
+from kernels.skeleton.kinematics import forward
 from kernels.types import Float, MotionGraph
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
+from schemas.keys import mirrored, source_clip
 from schemas.settings import MotionGraphSettings
+
+MEMORY_VERSION = "1"
+"""Raised by hand when features, rules or the shortlist change meaning."""
 
 PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
     "reach": keep_endless,
@@ -33,24 +40,12 @@ PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Beats:
-    """The beats of one clip as the graph takes them."""
-
-    clip_id: str
-    label: str
-    duration_s: float
-    time_s: Float
-    features: BeatFeatures
-    accent: Float
-
-
 @table_assets(
     "motion_graph",
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
-    code_version="2",
-    settings="motion_graph dance",
+    code_version="3",
+    settings="motion_graph dance.blend_s",
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
     checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
 )
@@ -60,32 +55,52 @@ def motion_graph(
     motion_beat: Stored,
     studio: dg.ResourceParam[Studio],
     pair_distance: dg.ResourceParam[PairDistance],
+    graph_memory: dg.ResourceParam[Memory],
     progress: dg.ResourceParam[Progress],
 ) -> Iterator[dg.Output[Part] | dg.AssetCheckResult]:
     """Join the beats of all clips where one pose may follow another."""
     settings = studio.settings().motion_graph
     progress.begin("motion graph", len(motion_beat.keys))
-    beats = [
-        b for key in motion_beat.keys for b in _session(key, clip, canonical_pose, motion_beat, settings, progress)
-    ]
+    margin_s = blend_margin_s(studio.settings().dance.blend_s)
+    rules = version_of(MEMORY_VERSION, settings.metric, str(settings.neighbours), repr(margin_s))
+    earlier = recall(graph_memory, rules)
+    known = earlier.clips if earlier else {}
+    labels: dict[str, str] = {}
+    beats = []
+    for key in motion_beat.keys:
+        labels |= {row["clip_id"]: row["label"] for row in clip.read(key).to_pylist() if row["state"] == "read"}
+        beats += _session(key, labels, canonical_pose, motion_beat, settings, known)
+        progress.step()
     nodes = beat_nodes([b.time_s for b in beats], [b.duration_s for b in beats])
-    found = find_transitions(
-        concatenate_beats([b.features for b in beats] or [_of_no_beat(settings)]),
+    features, listed, work = near_pairs(
+        earlier,
+        beats,
         nodes,
+        _of_no_beat(settings),
         distance=pair_distance,
-        threshold=settings.threshold or None,
         n_nearest=settings.neighbours,
-        min_margin_s=blend_margin_s(studio.settings().dance.blend_s),
+        min_margin_s=margin_s,
     )
-    graph = replace(found.graph, accent=np.concatenate([*(b.accent for b in beats), np.zeros(0)]))
+    keep(graph_memory, rules, beats, features, listed)
+    pairs = nearest_of(listed, nodes, n_nearest=settings.neighbours)
+    found = connect(nodes, pairs, threshold=settings.threshold or None)
+    seen = {
+        name: np.concatenate([*(getattr(b, name) for b in beats), np.zeros(0)])
+        for name in ("accent", "peak_jerk", "usual_jerk")
+    }
+    graph = replace(found.graph, **seen)
     losses = {name: prune(graph) for name, prune in PRUNE.items()}
     kept = losses[settings.prune]
     index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
-    ids, labels = [b.clip_id for b in beats], [b.label for b in beats]
-    node = tables.from_motion_graph_node(graph, ids, index, labels, kept.is_kept)
+    ids = [b.clip_id for b in beats]
+    node = tables.from_motion_graph_node(graph, ids, index, [labels[source_clip(clip)] for clip in ids], kept.is_kept)
     edge = tables.from_motion_graph_edge(graph, ids, found.distance)
     metadata = _metadata(found, losses, settings.prune) | {
         "device": getattr(pair_distance, "name", "reference"),
+        "computed_clips": sum(b.version != (known[b.clip_id].version if b.clip_id in known else "") for b in beats),
+        "computed_rows": work.computed_nodes,
+        "rows_searched_again": work.refilled_rows,
+        "computed_distances": work.distances,
         "labels": dg.MetadataValue.md(_by_label(node)),
     }
     yield dg.Output(Part("", node, metadata=metadata), MOTION_GRAPH_NODE.name)
@@ -101,33 +116,59 @@ def motion_graph(
 
 def _session(
     key: str,
-    clip: Stored,
+    labels: Mapping[str, str],
     canonical_pose: Stored,
     motion_beat: Stored,
     settings: MotionGraphSettings,
-    progress: Progress,
+    known: Mapping[str, Beats],
 ) -> list[Beats]:
-    """Take the beats of one session's clips with their features."""
-    labels = {row["clip_id"]: row["label"] for row in clip.read(key).to_pylist() if row["state"] == "read"}
+    """Take the beats of one session's clips with their features: remembered ones where nothing changed."""
     beats = tables.by_clip(motion_beat.read(key))
-    poses = tables.by_clip(canonical_pose.read(key, clip_ids=beats)) if beats else {}
+    versions = {
+        clip: version_of(stored.content, motion_beat.stamp(key).clips[clip].content)
+        for clip, stored in canonical_pose.stamp(key).clips.items()
+        # Not beats of an earlier build whose renewal failed.
+        if clip in beats and clip in labels
+    }
+    images = {clip: [clip, *([mirrored(clip)] if settings.mirror else [])] for clip in versions}
+    changed = [
+        clip
+        for clip, version in versions.items()
+        if any(name not in known or known[name].version != version for name in images[clip])
+    ]
+    poses = tables.by_clip(canonical_pose.read(key, clip_ids=changed)) if changed else {}
     found = []
-    for clip_id, rows in beats.items():
-        if clip_id not in labels or clip_id not in poses:  # beats of an earlier build whose renewal failed
-            continue
-        moved = tables.to_canonical_pose(poses[clip_id])
-        time_s = np.minimum(tables.to_numbers(rows["time_s"]), moved.duration_s)
-        features = beat_features(
-            moved.rotation_wxyz,
-            moved.position_xyz_m,
-            frame_rate_hz=moved.frame_rate_hz,
-            time_s=time_s,
-            metric=settings.metric,  # type: ignore[arg-type]
-        )
-        accent = accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
-        found.append(Beats(clip_id, labels[clip_id], moved.duration_s, time_s, features, accent))
-    progress.step()
+    for clip_id in beats:
+        if clip_id in poses:
+            moved = tables.to_canonical_pose(poses[clip_id])
+            time_s = tables.to_numbers(beats[clip_id]["time_s"])
+            each = (moved, _image(moved))[: len(images[clip_id])]
+            found += [_beats(image, time_s, versions[clip_id], settings) for image in each]
+        elif clip_id in versions and clip_id not in changed:
+            found += [known[name] for name in images[clip_id]]
     return found
+
+
+def _image(moved: tables.CanonicalClip) -> tables.CanonicalClip:
+    """Mirror a clip, left for right."""
+    root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
+    position, _ = forward(CANONICAL, root, turned)
+    return tables.CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
+
+
+def _beats(moved: tables.CanonicalClip, beat_s: Float, version: str, settings: MotionGraphSettings) -> Beats:
+    """Take the beats of one clip with their features."""
+    time_s = np.minimum(beat_s, moved.duration_s)
+    features = beat_features(
+        moved.rotation_wxyz,
+        moved.position_xyz_m,
+        frame_rate_hz=moved.frame_rate_hz,
+        time_s=time_s,
+        metric=settings.metric,  # type: ignore[arg-type]
+    )
+    peak, usual = jerk_around(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
+    accent = accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
+    return Beats(moved.clip_id, version, moved.duration_s, time_s, features, accent, peak, np.full(len(time_s), usual))
 
 
 def _of_no_beat(settings: MotionGraphSettings) -> BeatFeatures:

@@ -1,6 +1,5 @@
 """A dance through the motion graph, as its director wants it: pins, licences, alternatives."""
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,6 +22,7 @@ from kernels.graph.costs import PathCosts
 from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
 from kernels.graph.pins import Pin, Reach, admitted, find_conflict
 from kernels.types import Choreography, Float, Int, MotionGraph
+from schemas.keys import source_clip
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
 
@@ -96,7 +96,7 @@ def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame
         Without the transitions of clips that may not be changed: those are danced whole or not at all.
     """
     known = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
-    facts = [known[clip] for clip in clip_ids]
+    facts = [known[source_clip(clip)] for clip in clip_ids]
     of_node = graph.clip_index
     licence = [str(row["licence"]) for row in facts]
     is_whole = np.array([licences.terms_of(name).no_derivatives for name in licence] or [False])[of_node]
@@ -116,7 +116,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
         If no dance can be had, or not with these pins; its metadata hold the conflict and the ways out.
     """
     graph = known.graph
-    pins = _pins(known, song, asked)
+    pins = pins_of(known, song, asked)
     mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
     if not known.is_allowed.any() and len(known.is_allowed):
         raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
@@ -160,7 +160,8 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
     )
 
 
-def _pins(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
+def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
+    """Bring what is wished onto beats and nodes; dg.Failure where a pin names no place of the song."""
     try:
         return [direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:
@@ -178,7 +179,13 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
     usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
     if not reach.is_danceable:
         return  # the search says why there is no dance at all
-    conflict = find_conflict(reach, usable, choices=_choices(known, asked))
+    conflict = find_conflict(
+        reach,
+        usable,
+        choices=[
+            {name: nodes & known.is_allowed for name, nodes in known.nodes.instead_of(w).items()} for w in asked.wishes
+        ],
+    )
     if conflict is None:
         return
     told = direction.sentences(conflict, usable, asked.wishes, song, known.nodes)
@@ -195,17 +202,6 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
     )
 
 
-def _choices(known: Catalogue, asked: Direction) -> dict[str, NDArray[np.bool_]]:
-    """Labels to try in place of what is wished, those spelt alike first."""
-    wished = [wish.label for wish in asked.wishes if wish.label]
-    labels = known.nodes.labels()
-
-    def unlike(label: str) -> float:
-        return -max((difflib.SequenceMatcher(None, label, wish).ratio() for wish in wished), default=0.0)
-
-    return {label: labels[label] for label in sorted(labels, key=lambda label: (unlike(label), label))}
-
-
 def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:
     """Name of the pin that a step serves: the first of those it touches; None for none."""
     return next((pin.name for pin in pins if beat < pin.last and beat + span > pin.first), None)
@@ -217,7 +213,7 @@ def kept_pins(pins: Sequence[Pin], song: SongBeats, path: Path, known: Catalogue
     node: dict[int, int] = {}
     for k, d, u in zip(path.beat_index.tolist(), path.beat_span.tolist(), path.source_node.tolist(), strict=True):
         for interval in range(k, k + d):
-            clip[interval], node[interval] = known.clip_ids[known.graph.clip_index[u]], u
+            clip[interval], node[interval] = source_clip(known.clip_ids[known.graph.clip_index[u]]), u
     facts = direction.kept(pins, song, clip)
     for pin, fact in zip(pins, facts, strict=True):
         fact["is_kept"] = bool(all(pin.nodes[node[k]] for k in range(pin.first, pin.last)))

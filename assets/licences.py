@@ -1,14 +1,33 @@
 """What the licences of the clips in a dance ask of the dance: the most restrictive wins.
 
-SPDX names are read by their parts (``CC-BY-NC-4.0``); ``studio`` is a studio's own, not to be passed on; an empty one
-is not known and counts as that.
+SPDX names are read by their parts (``CC-BY-NC-4.0``) and joined by ``AND``, ``OR`` and ``WITH``; ``studio`` is a
+studio's own, not to be passed on; one that is not known, or that nobody named, counts as that.
 """
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 STUDIO = "studio"
-_FREE = frozenset({"CC0-1.0", "0BSD", "MIT", "BSD-2-CLAUSE", "BSD-3-CLAUSE", "APACHE-2.0", "PDDL-1.0", "UNLICENSE"})
+_FREE = frozenset(
+    [
+        "CC0-1.0",
+        "CC0",
+        "0BSD",
+        "MIT",
+        "MIT-0",
+        "ISC",
+        "ZLIB",
+        "BSD-2-CLAUSE",
+        "BSD-3-CLAUSE",
+        "APACHE-2.0",
+        "PDDL-1.0",
+        "UNLICENSE",
+        "WTFPL",
+    ]
+)
+_SHARE_ALIKE = re.compile(r"(A|L)?GPL-|MPL-|EUPL-|ODBL-|CDLA-SHARING-")
+_TOKEN = re.compile(r"\(|\)|[^\s()]+")
 
 
 @dataclass(frozen=True, order=True)
@@ -44,17 +63,56 @@ def terms_of(licence: str) -> Terms:
 
     Parameters
     ----------
-    licence : SPDX name in any case, ``studio``, or a name with ``NC`` or ``ND`` among its parts; "" when not known
+    licence : SPDX name or expression in any case, ``studio``, or a name with ``NC`` or ``ND`` among its parts; "" when
+        not known
 
     Returns
     -------
     Terms
-        Of a name that is none of these: attribution, and not to leave the studio until somebody has read it.
+        Of ``A AND B`` both, of ``A OR B`` the freer. Of a name that is none of these: attribution, and not to leave the
+        studio until somebody has read it.
     """
-    name = licence.strip().upper()
+    words = _TOKEN.findall(licence.strip().upper())
+    if {"AND", "OR", "WITH"} & set(words):
+        terms, rest = _either(words)
+        return terms if not rest else Terms(is_internal=True, attribution=True)
+    return _terms_of_name(licence.strip().upper())
+
+
+def _either(words: list[str]) -> tuple[Terms, list[str]]:
+    """Read ``A OR B …``: the freest; what is left of the words comes back too."""
+    terms, rest = _both(words)
+    while rest[:1] == ["OR"]:
+        other, rest = _both(rest[1:])
+        terms = min(terms, other)
+    return terms, rest
+
+
+def _both(words: list[str]) -> tuple[Terms, list[str]]:
+    """Read ``A AND B …``: the terms of all."""
+    terms, rest = _one(words)
+    while rest[:1] == ["AND"]:
+        other, rest = _one(rest[1:])
+        terms |= other
+    return terms, rest
+
+
+def _one(words: list[str]) -> tuple[Terms, list[str]]:
+    """Read one name, or an expression in brackets; an exception (``WITH …``) changes nothing here."""
+    if words[:1] == ["("]:
+        terms, rest = _either(words[1:])
+        rest = rest[1:] if rest[:1] == [")"] else ["("]
+    else:
+        terms, rest = _terms_of_name(words[0] if words else ""), words[1:]
+    return terms, rest[2:] if rest[:1] == ["WITH"] else rest
+
+
+def _terms_of_name(name: str) -> Terms:
     parts = set(name.replace(" ", "-").split("-"))
     if name in _FREE:
         return Terms()
+    if _SHARE_ALIKE.match(name):
+        return Terms(share_alike=True, attribution=True)
     known = parts & {"BY", "NC", "ND", "SA"}
     return Terms(
         is_internal=not known,
@@ -83,6 +141,72 @@ def together(licences: Iterable[str]) -> tuple[str, Terms]:
     for licence in named:
         terms |= terms_of(licence)
     return max(named, key=lambda licence: (terms_of(licence), [-ord(c) for c in licence]), default=""), terms
+
+
+def report(licence_of: Mapping[str, str]) -> dict[str, object]:
+    """Say under which terms a dance may be used, for its stage and its report.
+
+    Parameters
+    ----------
+    licence_of : licence of each clip danced; "" where nobody named one
+
+    Returns
+    -------
+    dict
+        ``name`` and ``terms`` of :func:`together`; ``clips`` by licence; ``unknown``, the clips without one or with one
+        that is not known; and ``sentence`` for a person.
+    """
+    name, terms = together(licence_of.values())
+    by_licence: dict[str, list[str]] = {}
+    for clip, licence in sorted(licence_of.items()):
+        by_licence.setdefault(licence.strip() or "unknown", []).append(clip)
+    unknown = [clip for clip, licence in sorted(licence_of.items()) if _is_unknown(licence)]
+    said = [_WORDS[word] for word in terms.words()]
+    sentence = "; ".join(said) if said else "free to use"
+    if unknown:
+        sentence += (
+            f"; {len(unknown)} of {len(licence_of)} clips have no licence that is known and count as the studio's own"
+        )
+    keep = [licence for licence in by_licence if terms_of(licence).share_alike]
+    if keep and any(terms != terms_of(licence) for licence in keep):
+        sentence += f"; {', '.join(keep)} wants the whole under its own terms, which the others do not allow"
+    return {"name": name, "terms": terms.words(), "clips": by_licence, "unknown": unknown, "sentence": sentence}
+
+
+_WORDS = {
+    "internal": "not to leave the studio",
+    "no derivatives": "not to be changed",
+    "non commercial": "not for sale",
+    "share alike": "to be passed on under the same licence",
+    "attribution": "authors to be named",
+}
+
+
+def _is_unknown(licence: str) -> bool:
+    """Whether nobody named a licence, or one that says nothing here; a studio's own is known."""
+    return terms_of(licence).is_internal and licence.strip().lower() != STUDIO
+
+
+def may_be_joined(licence: str) -> bool:
+    """Whether a clip may be blended with others: not where its licence forbids to change it."""
+    return not terms_of(licence).no_derivatives
+
+
+def free_to_join(licence_of: Mapping[str, str], allow: Iterable[str]) -> set[str]:
+    """Find the clips that may be danced in pieces, blended with others.
+
+    Parameters
+    ----------
+    licence_of : licence by clip
+    allow : licences that may be danced; all where empty
+
+    Returns
+    -------
+    set of clips
+        Those of an allowed licence that may be changed.
+    """
+    allowed = tuple(allow)
+    return {clip for clip, name in licence_of.items() if is_allowed(name, allowed) and may_be_joined(name)}
 
 
 def is_allowed(licence: str, allow: Iterable[str]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -122,6 +123,18 @@ class StoredMatches:
     score: Float
     music_ratio: Float
     mutual_ratio: Float
+
+    def only(self, kept: Sequence[bool]) -> StoredMatches:
+        """Take some of them, by (N,) truths."""
+        mask = np.array(kept, bool)
+        return StoredMatches(
+            tuple(itertools.compress(self.clip_ids, mask)),
+            self.numerator[mask],
+            self.start_frame_index[mask],
+            self.score[mask],
+            self.music_ratio[mask],
+            self.mutual_ratio[mask],
+        )
 
 
 def to_matches(table: pa.Table, n_segments: int) -> list[StoredMatches]:

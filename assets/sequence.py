@@ -1,6 +1,6 @@
 """From the matches of a song to its steps: pieces of clips, how they join, and the best sequence of them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +14,8 @@ from assets.lineage import Stored
 from assets.matching_tables import Rhythm, StoredMatches
 from kernels.assembly.timing import blend_widths
 from kernels.matching import connect, intensity, path
-from kernels.matching.pieces import ease_pace, longest_first, motion_under, snap_start, split_span
-from kernels.matching.score import SCALE_DENOMINATOR
+from kernels.matching.pieces import ease_pace, longest_first, motion_under, other_starts, snap_start, split_span
+from kernels.matching.score import SCALE_DENOMINATOR, ratios, similarity
 from kernels.motion.features import FEATURE_RATE_HZ, at_feature_rate, link_directions, link_weights
 from kernels.motion.velocity import usable_frames
 from kernels.music.segments import Segments
@@ -56,6 +56,20 @@ class LoadedMatches:
 
 
 @dataclass(frozen=True)
+class Place:
+    """Where a clip goes with a segment: a match, or another start in the clip of one.
+
+    ``rank_number`` is the match's, ``cost`` what it lacks as a match, 0 to 1 (:func:`match_cost`).
+    """
+
+    clip_id: str
+    rank_number: int
+    numerator: int
+    start_frame_index: int
+    cost: float
+
+
+@dataclass(frozen=True)
 class Piece:
     """A stretch of a clip a span of the song may be danced with, and its own costs.
 
@@ -85,13 +99,16 @@ def load_matches(
     music_feature: Stored,
     motion_feature: Stored,
     motion_beat: Stored,
+    *,
+    may_dance: Container[str],
 ) -> LoadedMatches:
-    """Read a song's matches and the clips they name; where a segment has none, the longest clips as well."""
+    """Read a song's matches among the clips that may be danced; where a segment has none, the longest clips as well."""
     segments = matching_tables.to_music_segment(music_segment.read(song_id))
-    matches = matching_tables.to_matches(match.read(song_id), len(segments.start_s))
+    every = matching_tables.to_matches(match.read(song_id), len(segments.start_s))
+    matches = [m.only([clip in may_dance for clip in m.clip_ids]) for m in every]
     wanted = {clip for m in matches for clip in m.clip_ids}
     if any(not m.clip_ids for m in matches):
-        wanted |= _longest(motion_feature)
+        wanted |= _longest(motion_feature, may_dance)
     clips: dict[str, ClipFeatures] = {}
     for key in motion_feature.keys:
         here = wanted & set(motion_feature.stamp(key).clips)
@@ -114,9 +131,9 @@ def load_matches(
     )
 
 
-def _longest(motion_feature: Stored, *, most: int = 20) -> set[str]:
+def _longest(motion_feature: Stored, may_dance: Container[str], *, most: int = 20) -> set[str]:
     sizes = {c: r.num_rows for key in motion_feature.keys for c, r in tables.by_clip(motion_feature.read(key)).items()}
-    names = sorted(sizes)
+    names = sorted(clip for clip in sizes if clip in may_dance)
     return {names[i] for i in longest_first(np.array([sizes[n] for n in names], np.int64), most=most)}
 
 
@@ -210,17 +227,13 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
     for i, matches in enumerate(found.matches):
         start_s, end_s = float(found.segments.start_s[i]), float(found.segments.end_s[i])
         if matches.clip_ids:
-            made = [
-                _of_match(found, i, rank, parts[i], beat_s, (song_edges, clip_edges), settings)
-                for rank in range(len(matches.clip_ids))
-            ]
+            places = places_of(matches, parts[i], found.clips, most=settings.other_starts)
+            cut = (song_edges, clip_edges)
+            made = [_piece(found, i, place, parts[i], beat_s, cut, settings) for place in places]
             # Pieces far from their own pace are for segments that have no others.
             easy = [p for p in made if p.is_easy]
             if not easy:
-                made = [
-                    _of_match(found, i, rank, parts[i], beat_s, (song_edges, clip_edges), settings, is_eased=True)
-                    for rank in range(len(matches.clip_ids))
-                ]
+                made = [_piece(found, i, place, parts[i], beat_s, cut, settings, is_eased=True) for place in places]
                 easy = [p for p in made if p.is_easy]
             every.append(easy or made)
             edges.append(end_s)
@@ -244,10 +257,27 @@ def _pairs(edges: Float) -> tuple[list[float], list[float]]:
     return edges[:-1].tolist(), edges[1:].tolist()
 
 
-def _of_match(
+def places_of(matches: StoredMatches, part: Rhythm, clips: Mapping[str, ClipFeatures], *, most: int) -> list[Place]:
+    """List the matches of a segment and, in each one's clip, at most ``most`` other starts; with what each costs."""
+    found = list(enumerate(matches.start_frame_index.tolist()))
+    score, mutual = matches.score.tolist(), matches.mutual_ratio.tolist()
+    for rank, start in enumerate(matches.start_frame_index.tolist()):
+        rhythm, numerator = clips[matches.clip_ids[rank]].rhythm, int(matches.numerator[rank])
+        for other in other_starts(part, rhythm, numerator=numerator, start_frame_index=start, most=most).tolist():
+            motion = motion_under(rhythm, len(part), numerator=numerator, start=other)
+            found.append((rank, other))
+            score.append(float(similarity(part, motion).sum()))
+            mutual.append(ratios(score[-1], float(part.sum(dtype=np.float64)), float(motion.sum()))[1])
+    return [
+        Place(matches.clip_ids[rank], rank + 1, int(matches.numerator[rank]), start, cost)
+        for (rank, start), cost in zip(found, match_cost(np.array(score), np.array(mutual)).tolist(), strict=True)
+    ]
+
+
+def _piece(
     found: LoadedMatches,
     segment: int,
-    rank: int,
+    place: Place,
     part: Rhythm,
     beat_s: Float,
     edges: tuple[Float, Float],
@@ -255,10 +285,9 @@ def _of_match(
     *,
     is_eased: bool = False,
 ) -> Piece:
-    """Make one match a piece, and price it."""
-    matches, segments = found.matches[segment], found.segments
-    clip = found.clips[matches.clip_ids[rank]]
-    numerator, start = int(matches.numerator[rank]), int(matches.start_frame_index[rank])
+    """Make one place of a clip a piece, and price it."""
+    segments, clip = found.segments, found.clips[place.clip_id]
+    numerator, start = place.numerator, place.start_frame_index
     if is_eased:
         numerator, start = ease_pace(
             part, clip.rhythm, numerator=numerator, start_frame_index=start, loss_ratio=settings.snap_loss_ratio
@@ -287,11 +316,11 @@ def _of_match(
     )
     warp = (end_s - start_s) / (clip_end_s - clip_s)
     return Piece(
-        matches.clip_ids[rank],
+        place.clip_id,
         clip_s,
         clip_end_s,
-        rank + 1,
-        settings.match_weight * match_cost(matches, rank),
+        place.rank_number,
+        settings.match_weight * place.cost,
         settings.intensity_weight * (1.0 - agreement),
         WARP_COST * abs(float(np.log(warp))) / float(np.log(1.1)),
         frame != start,
@@ -299,10 +328,13 @@ def _of_match(
     )
 
 
-def match_cost(matches: StoredMatches, rank: int) -> float:
-    """Cost of a match, 0 to 1: half for its place among the candidates, half for what lacks to an equal rhythm."""
-    place = rank / max(len(matches.clip_ids) - 1, 1)
-    return 0.5 * place + 0.5 * (1.0 - float(matches.mutual_ratio[rank]))
+def match_cost(score: Float, mutual_ratio: Float) -> Float:
+    """Cost of each place, 0 to 1: half for its rank among them, half for what lacks to an equal rhythm.
+
+    Its rank is the share of the others with a better score, so equal scores cost the same.
+    """
+    better = np.searchsorted(np.sort(-score), -score)
+    return np.asarray(0.5 * better / max(len(score) - 1, 1) + 0.5 * (1.0 - mutual_ratio), np.float64)
 
 
 def joints_of(

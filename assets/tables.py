@@ -26,6 +26,7 @@ from kernels.types import BeatGrid, Choreography, Clip, Float, Int, MotionGraph,
 from schemas.choreography import CHOREOGRAPHY, DANCE_POSE, DANCE_QUALITY, FRAME_LINEAGE
 from schemas.fields import QUATERNION, VECTOR
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
+from schemas.keys import is_mirrored, mirrored, source_clip
 from schemas.motion import CANONICAL_POSE, MOTION_BEAT, POSE, SKELETON
 from schemas.music import MUSIC_BEAT, MUSIC_LOUDNESS, MUSIC_TEMPO
 from schemas.table import Table
@@ -300,12 +301,16 @@ def from_motion_graph_node(
     """Pack the nodes of a motion graph, N rows; ``clip_ids`` and ``labels`` are by clip index."""
     columns = [
         pa.array(np.arange(len(graph.time_s)), pa.int32()),
-        pa.array([clip_ids[c] for c in graph.clip_index], pa.string()),
+        pa.array([source_clip(clip_ids[c]) for c in graph.clip_index], pa.string()),
+        pa.array([is_mirrored(clip_ids[c]) for c in graph.clip_index], pa.bool_()),
         pa.array(beat_index, pa.int32()),
         pa.array(graph.time_s),
         pa.array(graph.next_node, pa.int32()),
         pa.array([labels[c] for c in graph.clip_index], pa.string()),
-        pa.array(np.zeros(len(graph.time_s)) if graph.accent is None else graph.accent, pa.float32()),
+        *(
+            pa.array(np.zeros(len(graph.time_s)) if values is None else values, pa.float32())
+            for values in (graph.accent, graph.peak_jerk, graph.usual_jerk)
+        ),
         pa.array(is_kept),
     ]
     return MOTION_GRAPH_NODE.check(pa.table(columns, schema=MOTION_GRAPH_NODE.arrow))
@@ -316,8 +321,8 @@ def from_motion_graph_edge(graph: MotionGraph, clip_ids: Sequence[str], distance
     columns = [
         pa.array(graph.source, pa.int32()),
         pa.array(graph.target, pa.int32()),
-        pa.array([clip_ids[c] for c in graph.clip_index[graph.source]], pa.string()),
-        pa.array([clip_ids[c] for c in graph.clip_index[graph.target]], pa.string()),
+        pa.array([source_clip(clip_ids[c]) for c in graph.clip_index[graph.source]], pa.string()),
+        pa.array([source_clip(clip_ids[c]) for c in graph.clip_index[graph.target]], pa.string()),
         pa.array(distance, pa.float32()),
         pa.array(graph.weight, pa.float32()),
     ]
@@ -329,7 +334,7 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
     kept = to_numbers(node["is_kept"]).astype(bool)
     number = np.where(kept, np.cumsum(kept) - 1, -1)
     node = node.filter(pa.array(kept))
-    clip_of = node["clip_id"].to_pylist()
+    clip_of = _names(node)
     clip_ids = tuple(dict.fromkeys(clip_of))
     index = {clip: i for i, clip in enumerate(clip_ids)}
     following = to_numbers(node["next_node_index"]).astype(np.int64)
@@ -344,6 +349,8 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
         target=target[inside],
         weight=to_numbers(edge["edge_cost"]).astype(np.float64)[inside],
         accent=to_numbers(node["accent_score"]).astype(np.float64),
+        peak_jerk=to_numbers(node["jerk_m_per_s3"]).astype(np.float64),
+        usual_jerk=to_numbers(node["clip_jerk_m_per_s3"]).astype(np.float64),
     )
     return graph, clip_ids
 
@@ -371,7 +378,8 @@ def from_choreography(
         "step_index": pa.array(np.arange(s), pa.int32()),
         "song_start_s": pa.array(steps.song_start_s),
         "song_end_s": pa.array(steps.song_end_s),
-        "clip_id": pa.array(steps.clip_id, pa.string()),
+        "clip_id": pa.array([source_clip(name) for name in steps.clip_id], pa.string()),
+        "is_mirrored": pa.array([is_mirrored(name) for name in steps.clip_id], pa.bool_()),
         "clip_start_s": pa.array(steps.clip_start_s),
         "clip_end_s": pa.array(steps.clip_end_s),
         "has_seam": pa.array(steps.has_seam),
@@ -387,9 +395,13 @@ def from_choreography(
 def to_choreography(rows: pa.Table) -> Choreography:
     """Unpack a choreography."""
     seconds = {c: to_numbers(rows[c]).astype(np.float64) for c in _STEP_SECONDS}
-    return Choreography(
-        clip_id=tuple(rows["clip_id"].to_pylist()), has_seam=to_numbers(rows["has_seam"]).astype(bool), **seconds
-    )
+    return Choreography(clip_id=tuple(_names(rows)), has_seam=to_numbers(rows["has_seam"]).astype(bool), **seconds)
+
+
+def _names(rows: pa.Table) -> list[str]:
+    """Names of the clips of rows that say whether they are mirrored."""
+    pairs = zip(rows["clip_id"].to_pylist(), rows["is_mirrored"].to_pylist(), strict=True)
+    return [mirrored(clip) if is_image else clip for clip, is_image in pairs]
 
 
 _COST_COLUMNS = tuple(name for name in CHOREOGRAPHY.arrow.names if name.endswith("_cost"))
@@ -417,15 +429,18 @@ def from_frame_lineage(song_id: str, method: str, dance: Dance, steps: Choreogra
     line = dance.lineage
     f = len(line.step_index)
     alone = line.blend_step_index < 0
-    names = np.array(steps.clip_id, object)
+    names = np.array([source_clip(name) for name in steps.clip_id], object)
+    mirrors = np.array([is_mirrored(name) for name in steps.clip_id], bool)
     columns = [
         pa.array([song_id] * f, pa.string()),
         pa.array([method] * f, pa.string()),
         pa.array(np.arange(f), pa.int32()),
         pa.array(dance.time_s),
         pa.array(names[line.step_index].tolist(), pa.string()),
+        pa.array(mirrors[line.step_index]),
         pa.array(line.clip_time_s),
         pa.array(names[line.blend_step_index].tolist(), pa.string(), mask=alone),
+        pa.array(mirrors[line.blend_step_index] & ~alone),
         pa.array(line.blend_time_s, pa.float64(), mask=alone),
         pa.array(np.where(alone, 0.0, line.blend_weight), pa.float32()),
         pa.array(steps.warp_ratio[line.step_index], pa.float32()),

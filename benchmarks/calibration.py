@@ -28,17 +28,16 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pyopencl as cl
 from calibration_bars import bars
 from numba_springs import relax_serial
 from threadpoolctl import threadpool_limits
 
+from assets.formats import suit as suit_file
 from kernels.calibration.calibrate import calibrate
 from kernels.calibration.cleaning import clean
 from kernels.calibration.poses import body_model, gaps, solve_poses, to_stream
-from kernels.calibration.records import PARENT, SENSORS, Recording
+from kernels.calibration.records import PARENT
 from kernels.calibration.springs import relax_frame, spring_body
 from kernels.calibration.tree_solver import Stream
 from kernels.opencl.device import pick_device
@@ -60,37 +59,6 @@ def median(repeats: int, run: Callable[[], object]) -> tuple[float, float, float
         cpu.append(time.process_time() - begin_cpu)
     middle = statistics.median(cpu)
     return middle, statistics.median(wall), (max(cpu) - min(cpu)) / middle
-
-
-def write_recording(recording: Recording, path: Path) -> None:
-    """Write the long form: one row a frame and sensor."""
-    f, s = recording.is_valid.shape
-    p, q = recording.position_xyz_m.reshape(-1, 3), recording.rotation_wxyz.reshape(-1, 4)
-    columns = {
-        "frame": np.repeat(np.arange(f, dtype=np.int32), s),
-        "time_s": np.repeat(np.arange(f) / recording.frame_rate_hz, s),
-        "sensor": pa.array(list(recording.sensors) * f).dictionary_encode(),
-        **{name: p[:, k] for k, name in enumerate(("px_m", "py_m", "pz_m"))},
-        **{name: q[:, k] for k, name in enumerate(("qw", "qx", "qy", "qz"))},
-        "is_valid": recording.is_valid.reshape(-1),
-    }
-    pq.write_table(pa.table(columns), path)
-
-
-def read_recording(path: Path) -> Recording:
-    """Read the long form back, as plainly as can be; odori's own reader checks more."""
-    table = pq.read_table(path)
-    names = table["sensor"].combine_chunks()
-    order = np.array([SENSORS.index(name) for name in names.dictionary.to_pylist()])
-    column = order[names.indices.to_numpy()]
-    frame = table["frame"].to_numpy()
-    shape = (int(frame.max()) + 1, len(SENSORS))
-    position, turned, is_valid = np.full((*shape, 3), np.nan), np.full((*shape, 4), np.nan), np.zeros(shape, bool)
-    position[frame, column] = np.stack([table[name].to_numpy() for name in ("px_m", "py_m", "pz_m")], -1)
-    turned[frame, column] = np.stack([table[name].to_numpy() for name in ("qw", "qx", "qy", "qz")], -1)
-    is_valid[frame, column] = table["is_valid"].to_numpy()
-    step_s = np.median(np.diff(table["time_s"].to_numpy()[:: len(SENSORS)]))
-    return Recording(float(1 / step_s), SENSORS, position, turned, is_valid)
 
 
 def speed(n_frames: int, repeats: int, device: str | None) -> dict[str, float | str]:
@@ -123,10 +91,10 @@ def speed(n_frames: int, repeats: int, device: str | None) -> dict[str, float | 
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "recording.parquet"
-        write_recording(made.recording, path)
+        path.write_bytes(suit_file.format_parquet(made.recording))
 
         def everything() -> None:
-            read = clean(read_recording(path))
+            read = clean(suit_file.read(path).recording)
             solve_poses(read, calibrate(read), device=solver)
 
         whole_cpu_s, whole_s, whole_spread = median(repeats, everything)

@@ -16,7 +16,7 @@ from kernels import rotation
 from kernels.calibration.calibrate import calibrate
 from kernels.calibration.cleaning import clean
 from kernels.calibration.faults import check_recording
-from kernels.calibration.pairs import pair_residuals, spanning_tree
+from kernels.calibration.pairs import pair_costs, spanning_tree
 from kernels.calibration.poses import body_model, solve_poses, to_stream
 from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, Finding, Recording
 from kernels.calibration.tree_solver import solve_tree
@@ -174,7 +174,7 @@ def _topology(n_frames: int, seeds: range) -> Figures:
             whole = ~cleaned.is_filled.any(axis=1)
             turned = rotation.to_matrix(np.moveaxis(cleaned.recording.rotation_wxyz[whole], 1, 0))
             place = np.moveaxis(cleaned.recording.position_xyz_m[whole], 1, 0)
-            wrong += len(set(spanning_tree(pair_residuals(turned, place))) - set(truth))
+            wrong += len(set(spanning_tree(pair_costs(turned, place))) - set(truth))
         found[f"row09_topology_{name}_wrong_edge_count"] = wrong
     return found
 

@@ -13,9 +13,10 @@ COLOUR = {
     "motion": "#d9efe0",
     "music": "#fbe6d4",
     "catalog": "#ece2f3",
+    "search": "#e3f0f0",
     "dance": "#f9dede",
 }
-SOURCES = {"clips": "clips/**", "song": "songs/*", "request": "what was asked"}
+SOURCES = {"clips": "clips/**", "song": "songs/*", "request": "what was asked", "character": "character"}
 # Columns by how far an asset is from the files; rows so that lines seldom cross.
 PLACES = {
     "clips": (0, 1),
@@ -35,6 +36,10 @@ PLACES = {
     "motion_feature": (3, 2.6),
     "music_feature": (2, 4.6),
     "music_segment": (2, 5.7),
+    "motion_encoder": (4, -0.4),
+    "motion_embedding": (5, -0.4),
+    "motion_index": (6, -0.9),
+    "label_proposal": (6, 0.1),
     "match": (3, 3.8),
     "percussion": (2, 6.8),
     "melody": (2, 7.8),
@@ -64,7 +69,7 @@ def box(name: str, label: str, colour: str, note: str = "") -> str:
 def corner(name: str) -> tuple[float, float]:
     """Upper left corner of a box."""
     column, row = PLACES[name]
-    return 12 + STEP_X * column, 34 + STEP_Y * row
+    return 12 + STEP_X * column, 84 + STEP_Y * row
 
 
 def line(start: str, end: str) -> str:
@@ -103,7 +108,7 @@ def picture() -> str:
         f'<text x="{30 + 110 * i}" y="18" class="k">{g}</text>'
         for i, g in enumerate(groups)
     )
-    width, height = 24 + STEP_X * 9 + WIDE, 34 + STEP_Y * 9 + HIGH + 12
+    width, height = 24 + STEP_X * 9 + WIDE, 84 + STEP_Y * 9 + HIGH + 12
     style = (
         ".b{stroke:#555;stroke-width:1}.l{fill:none;stroke:#888;stroke-width:1}"
         "text{font-family:sans-serif;fill:#222}.n{font-size:13px;text-anchor:middle}"

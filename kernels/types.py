@@ -163,6 +163,8 @@ class MotionGraph:
         d(i, j) / (d(i) + d(j)), equation 20 of JP5778523B2.
     accent : (N,) float64, 0 to 1, or None
         How plainly the body stops at each node, :func:`kernels.motion.velocity.accents`; None where it is not known.
+    peak_jerk, usual_jerk : (N,) float64, >= 0, metres per second cubed, or None
+        Of the recording around each node, and its clip's usual, :func:`kernels.motion.velocity.jerk_around`.
 
     Raises
     ------
@@ -177,9 +179,15 @@ class MotionGraph:
     target: Int
     weight: Float
     accent: Float | None = None
+    peak_jerk: Float | None = None
+    usual_jerk: Float | None = None
 
     def __post_init__(self) -> None:
         n, e = len(self.clip_index), len(self.source)
+        for name in ("peak_jerk", "usual_jerk"):
+            found = getattr(self, name)
+            if found is not None and not (found.shape == (n,) and np.isfinite(found).all() and (found >= 0).all()):
+                raise ValueError(f"{name}: want ({n},) finite, >= 0, got {found.shape}")
         if self.accent is not None and not (
             self.accent.shape == (n,) and ((self.accent >= 0) & (self.accent <= 1)).all()
         ):

@@ -24,7 +24,7 @@ from pipelines.resources import StudioFolder
 from schemas.keys import check_key
 
 # Stages in order; the groups of one stage run together, clip by clip carried over.
-STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("catalog",), ("dance",))
+STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("catalog",), ("search",), ("dance",))
 GROUPS = tuple(JOB_OF_GROUP)
 _RANGE_START, _RANGE_END = "dagster/asset_partition_range_start", "dagster/asset_partition_range_end"
 PID_TAG = "odori/pid"

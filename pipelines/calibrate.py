@@ -61,7 +61,11 @@ def calibrate(
     poses_path = (poses_out or Path(f"{recording.stem}{POSES_ENDING}")).absolute()
     try:
         found = calibrate_file(
-            recording, settings=chosen.calibration, sensors=settings.sensors, solvers=PoseSolvers(settings.opencl)
+            recording,
+            settings=chosen.calibration,
+            sensors=settings.sensors,
+            solvers=PoseSolvers(settings.opencl),
+            max_bytes=int(settings.limits.largest_clip_mb * 1e6),
         )
     except CalibrationError as error:
         return _refusal(recording, error)

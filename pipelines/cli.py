@@ -7,7 +7,7 @@ standard error. Exit status: 0 done, 1 done but some inputs were refused, 2 noth
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -89,6 +89,13 @@ def dance(
     alternatives: Annotated[
         int, typer.Option("--alternatives", help="How many different dances of each song to make.")
     ] = 1,
+    character: Annotated[
+        str, typer.Option("--character", metavar="CLIP|FILE.usd", help="Whose body dances; else as the brief says.")
+    ] = "",
+    propose: Annotated[
+        str | None,
+        typer.Option("--propose", metavar="PLACE", help="Only list what could be pinned there, with its cost."),
+    ] = None,
     temperature: Annotated[
         float | None,
         typer.Option("--temperature", help="Of hmm: 0 the most probable dance, 1 one drawn as the dancer would."),
@@ -101,8 +108,12 @@ def dance(
     Examples: odori dance waltz.mp3 · odori dance waltz --method matching · odori dance all ·
     odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY ·
     odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3 ·
+    odori dance waltz --propose 42 · odori dance waltz --pin 12=spin --propose bar:9-10 ·
+    odori dance waltz --character hero.usdz · odori dance waltz --character ayame-step_01 ·
     odori dance groove.mid --method hmm --temperature 0.5 --seed 2
     """
+    if propose is not None:
+        _propose(studio, songs, propose, pin or (), as_json)
     _dance(
         studio,
         songs,
@@ -112,9 +123,21 @@ def dance(
         as_json,
         pins=pin or (),
         alternatives=alternatives,
+        character=character,
         temperature=temperature,
         seed=seed,
     )
+
+
+def _propose(studio: Path | None, songs: list[str], place: str, pins: Sequence[str], as_json: bool) -> None:
+    from pipelines import commands
+    from pipelines.files import StudioError
+
+    with _Trouble(as_json):
+        if len(songs) != 1:
+            raise StudioError(f"--propose: want one song, got {len(songs)}; ask for each alone")
+        result = commands.propose(_folder(studio), songs[0], place, pins=pins, progress=_progress())
+        _finish(result, as_json)
 
 
 def _dance(
@@ -136,6 +159,27 @@ def _dance(
 
 
 @app.command()
+def why(
+    danced: Annotated[
+        str,
+        typer.Argument(metavar="DANCE", help="A song, 'SONG|METHOD', or a stage: .usdz or .usdc.", show_default=False),
+    ],
+    at: Annotated[float | None, typer.Option("--at", help="Second of the song; left out: the whole dance.")] = None,
+    studio: StudioOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Say where a moment of a dance comes from: clip, time, blend, pace, licence, and why it was chosen.
+
+    Examples: odori why waltz --at 12.34 · odori why 'waltz|graph_2' · odori why dances/waltz/graph.usdz --at 12.34 (a
+    stage answers for itself and needs no studio)
+    """
+    from pipelines import commands
+
+    with _Trouble(as_json):
+        _finish(commands.why(_folder(studio), danced, at_s=at), as_json)
+
+
+@app.command()
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE.usd[cz]", help="The stage to look at.")],
     as_json: JsonOption = False,
@@ -148,6 +192,55 @@ def check(
 
     with _Trouble(as_json):
         _finish(commands.check(file), as_json)
+
+
+@app.command()
+def search(
+    clip: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="CLIP", help="A clip's key, CLIP@2.5-4 for a stretch of it, or a BVH file.", show_default=False
+        ),
+    ] = None,
+    studio: StudioOption = None,
+    k: Annotated[int, typer.Option("-k", help="How many clips to find.", min=1, max=1000)] = 10,
+    label: Annotated[
+        list[str] | None, typer.Option("--label", help="Only clips of this label; may be repeated.")
+    ] = None,
+    style: Annotated[list[str] | None, typer.Option("--style", help="Only clips of this style.")] = None,
+    licence: Annotated[list[str] | None, typer.Option("--licence", help="Only clips of this licence.")] = None,
+    min_seconds: Annotated[float, typer.Option("--min-seconds", help="Only clips at least this long.", min=0.0)] = 0.0,
+    max_seconds: Annotated[
+        float | None, typer.Option("--max-seconds", help="Only clips at most this long.", min=0.0)
+    ] = None,
+    like: Annotated[list[str] | None, typer.Option("--like", help="More like this motion too.")] = None,
+    unlike: Annotated[list[str] | None, typer.Option("--unlike", help="Less like this motion.")] = None,
+    sheet: Annotated[Path | None, typer.Option("--sheet", help="Draw query and hits as stick figures: a PNG.")] = None,
+    train: Annotated[bool, typer.Option("--train", help="Train the encoder anew on the clips there are now.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Find the clips most like a motion.
+
+    Examples: odori search ayame-step · odori search ayame-step@2.5-4 -k 5 --style salsa · odori search take.bvh ·
+    odori search --like ayame-step --unlike kaede-kick --sheet hits.png
+    """
+    with _Trouble(as_json):
+        from pipelines import search as searching
+
+        wish = searching.Wish(
+            query=clip or "",
+            k=k,
+            label=label or (),
+            style=style or (),
+            licence=licence or (),
+            min_seconds=min_seconds,
+            max_seconds=float("inf") if max_seconds is None else max_seconds,
+            like=like or (),
+            unlike=unlike or (),
+        )
+        # The bar is made where something has to be: loading it loads Dagster.
+        result = searching.search(_folder(studio), wish, sheet=sheet, train=train, progress=lambda: _progress()())
+        _finish(result, as_json)
 
 
 @app.command()

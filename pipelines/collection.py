@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import dagster as dg
 
-from assets import capture, choreography, dance, graph, hmm, matching, motion, music, percussion
+from assets import capture, choreography, dance, graph, hmm, matching, motion, music, percussion, search, stage
 from pipelines.freshness import Freshness, nodes
 from pipelines.resources import StudioFolder
 
 ASSETS: Sequence[dg.AssetsDefinition] = [
     asset
     for asset in dg.load_assets_from_modules(
-        [capture, motion, music, percussion, graph, hmm, matching, choreography, dance]
+        [capture, motion, music, percussion, graph, hmm, matching, search, choreography, dance, stage]
     )
     if isinstance(asset, dg.AssetsDefinition)
 ]

@@ -1,16 +1,12 @@
 """What the command does: the report for a person, the facts for a machine, the exit status."""
 
 import difflib
-import json
-import shutil
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-import polars as pl
 from sqlalchemy.exc import DBAPIError
 
-from assets.formats import usd_package
 from assets.formats.errors import FormatError
 from assets.lineage import Progress
 from assets.motion import beat_settings
@@ -18,10 +14,11 @@ from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES, base_met
 from assets.sources import Request, Song
 from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
-from pipelines import hmm_report
+from pipelines import casting, dancing, proposing
+from pipelines import why as explaining
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.files import StudioError, write_beside
+from pipelines.files import LakeError, StudioError
 from pipelines.freshness import Freshness
 from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
 from pipelines.resources import StudioFolder
@@ -30,7 +27,7 @@ from pipelines.web import existing
 from schemas.pins import parse_pin
 
 
-class _Session:
+class Session:
     """A studio opened for work: held, tidied, its definitions loaded."""
 
     def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
@@ -90,7 +87,7 @@ def check_settings(studio: StudioFolder) -> None:
 def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
     """Bring a studio up to date."""
     studio = existing(root)
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     sources = work.state.sources
     if not sources.clips and not sources.songs:
         raise StudioError(f"{root}: want clips under clips/ and songs under songs/, got none; put some there")
@@ -138,6 +135,7 @@ def dance(
     progress: Callable[[], Any],
     pins: Sequence[str] = (),
     alternatives: int = 1,
+    character: str = "",
     temperature: float | None = None,
     seed: int = 0,
 ) -> Outcome:
@@ -146,21 +144,22 @@ def dance(
     if method is not None and method not in METHODS:
         raise StudioError(f"--method: want one of {', '.join(METHODS)}, got {method!r}")
     if out is not None:
-        _check_out(out)
+        dancing.check_out(out)
     pins = _pin_texts(pins)
     if temperature is not None and not 0 <= temperature <= 10:
         raise StudioError(f"--temperature: want 0 to 10, got {temperature:g}")
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
-    work = _Session(studio, progress)
+    work = Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
+    character = casting.named(studio, work.state.sources, character)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
     methods = {song.key: _ways(method or _briefed_method(studio, song), alternatives) for song in songs}
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
     before = studio.requests()
     for key in sorted(keys):
-        studio.remember(key, Request(frame_rate_hz or 0.0, pins, temperature, seed))
+        studio.remember(key, Request(frame_rate_hz or 0.0, pins, character, temperature, seed))
     names = {song.key for song in songs}
     if any(base_method(chosen) == "hmm" for ways in methods.values() for chosen in ways):
         names |= work.state.sources.performed_songs  # what the dancer danced to is what the model learns from
@@ -180,14 +179,38 @@ def dance(
             troubles += [f"failed: {f}" for f in report.failed] or [f"failed: {song.path}"]
             studio.remember(key, before.get(key))  # what cannot be is not asked for again every night
         else:
-            made.append(_dance_facts(studio, song.key, way))
+            made.append(dancing.facts_of(studio, song.key, way))
     if out is not None and made:
-        _copy(made[0], out)
+        dancing.copy_out(made[0], out)
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
-    facts = _dance_json(made, troubles, len(keys))
+    facts = dancing.dances_facts(made, troubles, len(keys))
     if not made:
         facts |= next((dict(t.facts) for t in report.troubles if "conflict" in t.facts), {})
-    return Outcome(status, facts, "\n".join(_dance_report(d) for d in made), list(dict.fromkeys(troubles)))
+    return Outcome(status, facts, "\n".join(dancing.report_of(d) for d in made), list(dict.fromkeys(troubles)))
+
+
+def propose(
+    root: Path,
+    wanted: str,
+    place: str,
+    *,
+    pins: Sequence[str] = (),
+    progress: Callable[[], Any],
+) -> Outcome:
+    """List what could be pinned at a place of a song, building first what that takes; nothing is danced."""
+    studio = existing(root)
+    pins = _pin_texts(pins)
+    work = Session(studio, progress)
+    songs = _wanted(work.state, [wanted], studio)
+    if len(songs) > 1:
+        raise StudioError(f"--propose: want one song, got {len(songs)}")
+    key = f"{songs[0].key}|{METHODS[0]}"
+    needed = {name for name in work.state.needed_for(key) if work.state.assets[name].kind != "dance"}
+    report = work.run(building.GROUPS, keys=lambda kind, one: kind != "song" or one == songs[0].key, assets=needed)
+    try:
+        return proposing.propose(studio, songs[0].key, place, pins)
+    except LakeError as error:
+        raise StudioError("; ".join([str(error), *report.failed])) from error
 
 
 def _pin_texts(pins: Sequence[str]) -> tuple[str, ...]:
@@ -211,99 +234,6 @@ def _briefed_method(studio: StudioFolder, song: Song) -> str:
         return studio.brief(song).method
     except FormatError:
         return METHODS[0]
-
-
-def _dance_json(made: list[dict[str, Any]], troubles: list[str], n_asked: int) -> dict[str, Any]:
-    if n_asked == 1:
-        return made[0] if made else {"error": "; ".join(dict.fromkeys(troubles))}
-    return {"dances": made, "troubles": list(dict.fromkeys(troubles))}
-
-
-def _dance_facts(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
-    folder = studio.dances / song
-    report = json.loads((folder / f"{method}.json").read_text())
-    model = hmm_report.model_facts(studio.lake) if method == "hmm" else None
-    if model is not None:
-        model["notes"] += hmm_report.dance_notes(report["wanted"])
-    return {
-        "song": song,
-        "method": method,
-        "stage": str(folder / f"{method}.usdc"),
-        "usdz": str(folder / f"{method}.usdz"),
-        "quality": report["quality"],
-        "not_as_wanted": sorted(n for n, m in report["wanted"].items() if m["is_passed"] is False),
-        "pins": _pin_facts(studio, f"{song}|{method}"),
-        **({} if model is None else {"model": model}),
-    }
-
-
-def _pin_facts(studio: StudioFolder, key: str) -> list[dict[str, Any]]:
-    """Tell for each pin when it is danced, by which clips, and whether it is kept."""
-    steps = pl.DataFrame(studio.lake.table("choreography", key)).filter(pl.col("pin_id").is_not_null())
-    if not len(steps):
-        return []
-    sessions = studio.lake.keys("clip")
-    clips = {r["clip_id"]: r for s in sessions for r in studio.lake.table("clip", s).to_pylist()}
-    facts = []
-    for pin, rows in steps.group_by("pin_id", maintain_order=True):
-        danced = list(dict.fromkeys(rows["clip_id"].to_list()))
-        facts.append(
-            {
-                "pin": pin[0],
-                "from_s": rows["song_start_s"].min(),
-                "to_s": rows["song_end_s"].max(),
-                "clips": danced,
-                "is_kept": all(parse_pin(str(pin[0])).is_kept_by(**_named(clips[clip])) for clip in danced),
-            }
-        )
-    return facts
-
-
-def _named(clip: Mapping[str, Any]) -> dict[str, str]:
-    return {"clip_id": str(clip["clip_id"]), "label": str(clip["label"]), "style": str(clip["style"])}
-
-
-def _dance_report(facts: dict[str, Any]) -> str:
-    q = facts["quality"]
-    lines = [
-        f"{facts['song']}: {facts['usdz']}",
-        f"  {q['clip_count']:.0f} clips, {q['seam_count']:.0f} seams; beats at most {q['beat_lag_ms']:.1f} ms off; "
-        f"warp {q['warp_least_ratio']:.2f} to {q['warp_most_ratio']:.2f}",
-        f"  on the beat to an independent eye: F {q['beat_f_ratio']:.2f}, p {q['beat_p_probability']:.3f}",
-    ]
-    lines += [
-        f"  pin {p['pin']}: {'kept' if p['is_kept'] else 'not kept'}, {', '.join(p['clips'])} "
-        f"from {p['from_s']:.2f} to {p['to_s']:.2f} s"
-        for p in facts["pins"]
-    ]
-    if facts["not_as_wanted"]:
-        lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")
-    if "model" in facts:
-        lines += hmm_report.report_lines(facts["model"])
-    return "\n".join(lines)
-
-
-def _check_out(out: Path) -> None:
-    """Refuse to copy to where a file of the user would be lost."""
-    if out.suffix not in (".usdz", ".usdc"):
-        raise StudioError(f"--out: want a file ending in .usdz or .usdc, got {out.name!r}")
-    sound = out.with_suffix(".wav")
-    if out.suffix == ".usdc" and sound.exists() and usd_package.song_name(out) != sound.name:
-        raise StudioError(
-            f"--out: want room for the song beside the stage, got another file {sound}; move it, or name another stage"
-        )
-
-
-def _copy(facts: dict[str, Any], out: Path) -> None:
-    source = Path(facts["usdz" if out.suffix == ".usdz" else "stage"])
-    facts["out"] = str(out)
-    if out.resolve() == source.resolve():
-        return
-    if out.suffix == ".usdc":
-        usd_package.copy_stage(out, source)
-    else:
-        with source.open("rb") as original:
-            write_beside(out, lambda file: shutil.copyfileobj(original, file))
 
 
 def _wanted(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[Song]:
@@ -338,6 +268,18 @@ def _wanted(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> li
 
 def _same(studio: StudioFolder, song: Song, text: str) -> bool:
     return Path(text).absolute() == studio.file(song.path)
+
+
+def why(root: Path, danced: str, *, at_s: float | None) -> Outcome:
+    """Say where a moment of a dance comes from, or where all of it does; a stage answers without a studio."""
+    if danced.lower().endswith(explaining.STAGE_SUFFIXES):
+        return explaining.why(explaining.from_stage(Path(danced)), at_s)
+    studio = existing(root)
+    state = freshness(studio)
+    text, bar, method = danced.partition("|")
+    song = _wanted(state, [text], studio)[0]
+    key = explaining.find_dance(studio, f"{song.key}{bar}{method}", _briefed_method(studio, song))
+    return explaining.why(explaining.from_lake(studio, key), at_s)
 
 
 def check(file: Path) -> Outcome:

@@ -7,8 +7,8 @@ import dagster as dg
 from pipelines import jobs, schedules, sensors
 from pipelines.calibrate import PoseSolvers
 from pipelines.collection import ASSETS, freshness
-from pipelines.io_managers import EarlierTables, LakeIOManager, StageIOManager
-from pipelines.resources import NoProgress, StudioFolder, matcher, pair_distance, studio_from_environment
+from pipelines.io_managers import EarlierTables, IndexIOManager, LakeIOManager, StageIOManager
+from pipelines.resources import GraphMemory, NoProgress, StudioFolder, matcher, pair_distance, studio_from_environment
 
 
 def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> dg.Definitions:  # noqa: ANN401 - resources are of any type
@@ -28,6 +28,7 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         "pair_distance": dg.ResourceDefinition(
             lambda context: pair_distance(context.resources.studio.settings().opencl), required_resource_keys={"studio"}
         ),
+        "graph_memory": GraphMemory(folder.lake),
         "matcher": dg.ResourceDefinition(
             lambda context: matcher(context.resources.studio.settings()), required_resource_keys={"studio"}
         ),
@@ -36,6 +37,10 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         ),
         "lake": dg.IOManagerDefinition(
             lambda context: LakeIOManager(context.resources.studio.lake, freshness(context.resources.studio)),
+            required_resource_keys={"studio"},
+        ),
+        "index": dg.IOManagerDefinition(
+            lambda context: IndexIOManager(context.resources.studio, freshness(context.resources.studio)),
             required_resource_keys={"studio"},
         ),
         "stage": dg.IOManagerDefinition(

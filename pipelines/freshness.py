@@ -14,7 +14,8 @@ from typing import Literal
 import dagster as dg
 
 from assets import sources as source_kinds
-from assets.declare import METHODS_KEY, ONLY_FOR_KEY, SETTINGS_KEY, SOURCES_KEY
+from assets.characters import character_version
+from assets.declare import KEEPS_KEY, METHODS_KEY, ONLY_FOR_KEY, SETTINGS_KEY, SOURCES_KEY
 from assets.lineage import Stamp, version_of
 from assets.partitions import ALTERNATIVES, METHODS, base_method
 from assets.sources import Sources
@@ -23,6 +24,8 @@ from pipelines.lake import Lake
 from pipelines.resources import StudioFolder
 
 STAGE_IO_MANAGER = "stage"
+ON_DEMAND = ("search",)
+"""Groups of assets that nobody makes before somebody asked for them once; from then on they are kept up to date."""
 Kind = Literal["session", "song", "dance", "whole"]
 State = Literal["fresh", "stale", "missing", "waiting"]
 
@@ -33,7 +36,7 @@ class Node:
 
     ``together`` are the assets made in the same pass, itself included; ``methods`` says, of an input or a section of
     settings (in brackets), which methods of dancing need it: every method does where nothing is said. ``only_for`` is
-    the one method an asset is made for, where there is one.
+    the one method an asset is made for, where there is one. ``keeps``: once made it stays when its inputs change.
     """
 
     name: str
@@ -47,6 +50,7 @@ class Node:
     writes_stages: bool = False
     methods: Mapping[str, str] = dataclasses.field(default_factory=dict)
     only_for: str = ""
+    keeps: bool = False
 
     def needs(self, name: str, key: str) -> bool:
         """Whether a partition of this asset is made from an input, or from a section of settings in brackets."""
@@ -86,6 +90,7 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
                 definition.get_io_manager_key_for_asset_key(spec.key) == STAGE_IO_MANAGER,
                 dict(said.split("=") for said in str(spec.metadata.get(METHODS_KEY, "")).split()),
                 str(spec.metadata.get(ONLY_FOR_KEY, "")),
+                KEEPS_KEY in spec.metadata,
             )
     ordered: dict[str, Node] = {}
     while len(ordered) < len(found):
@@ -116,6 +121,11 @@ class Freshness:
         self._lake = lake
         self._studio = studio
         self._stamps: dict[tuple[str, str], Stamp | None] = {}
+        self._asked: set[str] = set()
+
+    def ask(self, group: str) -> None:
+        """Count the assets of a group made on demand among those there should be."""
+        self._asked.add(group)
 
     @cached_property
     def sources(self) -> Sources:
@@ -154,6 +164,8 @@ class Freshness:
     def partitions(self, asset: str) -> list[str]:
         """Partitions of an asset there should be; of what only dances are made from, those of songs danced so."""
         node = self.assets[asset]
+        if node.group in ON_DEMAND and not self._is_asked(node.group):
+            return []
         found = self.keys(node.kind)
         if node.only_for and not self.is_used(node.only_for):
             return []
@@ -161,6 +173,9 @@ class Freshness:
             return found
         danced = {k.split("|")[0] for k in self.keys("dance") if asset in self.needed_for(k)}
         return [key for key in found if key in danced | set(self._lake.keys(asset))]
+
+    def _is_asked(self, group: str) -> bool:
+        return group in self._asked or any(self._lake.keys(n.name) for n in self.assets.values() if n.group == group)
 
     def is_used(self, method: str) -> bool:
         """Whether a method is used: a dance by it was asked for, or there are performances for it to learn from."""
@@ -209,6 +224,8 @@ class Freshness:
             return version_of(source_kinds.song_version(songs), brief)
         if kind == "request":
             return source_kinds.request_version(self._studio, key, self.sources)
+        if kind == "character":
+            return character_version(self._studio, key, self.sources)
         return ""
 
     def inputs(self, asset: str, key: str) -> dict[str, str] | None:
@@ -268,7 +285,9 @@ class Freshness:
             return Finding(asset, key, "stale", f"code version {stamp.code_version} is now {node.code_version}")
         if stamp.settings != self.settings_version(asset, key):
             return Finding(asset, key, "stale", f"settings [{'], ['.join(node.settings)}] changed")
-        expected = inputs | ({"sources": self.source_version(asset, key)} if node.sources else {})
+        expected = ({} if node.keeps else inputs) | (
+            {"sources": self.source_version(asset, key)} if node.sources else {}
+        )
         changed = sorted(name for name in expected if stamp.inputs.get(name) != expected[name])
         if changed:
             return Finding(asset, key, "stale", f"{', '.join(changed)} changed")

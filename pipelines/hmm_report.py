@@ -7,7 +7,8 @@ from pipelines.lake import Lake
 
 _NOBODY = (
     "no clip was danced to a song of this studio: motions follow each other as in the clips, drawn anew for every "
-    "seed, and the music gives no more than its beats; name the song in clips.csv (performed_to), or give both files one name"
+    "seed, and the music gives no more than its beats; name the song in clips.csv (performed_to), or give both files "
+    "one name"
 )
 _FEW = "the performances are too short to tell whether their music matters: nothing could be held out; add longer ones"
 

@@ -3,7 +3,9 @@
 Assets return tables or records, never paths; only this module and the lake know paths.
 """
 
+import dataclasses
 import json
+import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,16 +14,18 @@ import dagster as dg
 import pyarrow as pa
 
 from assets import tables
-from assets.dance import Stage
-from assets.formats import audio, tree, usd, usd_package
+from assets.formats import audio, motion_index, tree, usd, usd_cast, usd_package
 from assets.lineage import Part, Parts, Stamp, content_version
 from assets.partitions import dagster_key, lake_key
+from assets.search import Index
+from assets.stage import Stage
 from pipelines.files import LakeError, why, write_beside
 from pipelines.freshness import Freshness
 from pipelines.lake import Lake
 from pipelines.resources import StudioFolder
 from schemas.catalog import TABLES
 from schemas.choreography import USD_ANIMATION
+from schemas.search import MOTION_INDEX
 
 
 class StoredTable:
@@ -117,8 +121,30 @@ def _parts(obj: pa.Table | Part | Parts, keys: Sequence[str]) -> Iterable[Part]:
     return [obj if isinstance(obj, Part) else Part(keys[0], obj)]
 
 
+class IndexIOManager(LakeIOManager):
+    """Stores an :class:`~assets.search.Index`: its vectors as they are searched, then its rows, which name them."""
+
+    def __init__(self, studio: StudioFolder, freshness: Freshness) -> None:
+        super().__init__(studio.lake, freshness)
+        self._folder = studio.root / "lake" / MOTION_INDEX.name
+
+    def handle_output(self, context: dg.OutputContext, obj: Any) -> None:  # noqa: ANN401 - an Index, narrower than the parent's
+        """Write vectors, rows, and take away what the index before left."""
+        if not isinstance(obj, Index):
+            raise TypeError(f"motion_index: want an Index, got {type(obj).__name__}")
+        try:
+            said = motion_index.write_vectors(self._folder, obj.part.table, obj.vector)
+        except OSError as error:
+            raise LakeError(f"{self._folder}: cannot be written: {why(error)}") from error
+        table = MOTION_INDEX.with_metadata(obj.part.table, said)
+        super().handle_output(
+            context, dataclasses.replace(obj.part, table=table, metadata={**obj.part.metadata, **said})
+        )
+        motion_index.remove_others(self._folder, said)
+
+
 class StageIOManager(LakeIOManager):
-    """Writes a :class:`~assets.dance.Stage` as USD under ``dances/``, with a row in the lake that names it."""
+    """Writes a :class:`~assets.stage.Stage` as USD under ``dances/``, with a row in the lake that names it."""
 
     def __init__(self, studio: StudioFolder, freshness: Freshness) -> None:
         super().__init__(studio.lake, freshness)
@@ -144,7 +170,8 @@ class StageIOManager(LakeIOManager):
             }
             for path in written
         ]
-        super().handle_output(context, tables.from_rows(USD_ANIMATION, rows))
+        key = f"{obj.song_id}|{obj.method}"
+        super().handle_output(context, Part(key, tables.from_rows(USD_ANIMATION, rows), obj.asked))
 
 
 def write_dance(folder: Path, stage: Stage) -> list[Path]:
@@ -152,9 +179,17 @@ def write_dance(folder: Path, stage: Stage) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     sound, usdc, usdz = folder / "song.wav", folder / f"{stage.method}.usdc", folder / f"{stage.method}.usdz"
     audio.write_wav(sound, stage.sound)
-    usd.write_stage(
-        usdc, stage.clip, audio=sound.name, provenance=stage.provenance, title=f"{stage.song_id}, {stage.method}"
-    )
+    told: dict[str, Any] = {
+        "audio": sound.name,
+        "provenance": stage.provenance,
+        "title": f"{stage.song_id}, {stage.method}",
+        "lineage": stage.lineage,
+    }
+    if stage.cast is not None and stage.cast.rig is not None and stage.cast.copy is not None:
+        usd_cast.write_cast_stage(usdc, stage.clip, stage.cast.rig, stage.cast.copy, **told)
+    else:
+        usd.write_stage(usdc, stage.clip, **told)
+        shutil.rmtree(usd_cast.character_folder(usdc), ignore_errors=True)  # of a dance by somebody else
     usd_package.write_package(usdz, usdc)
     report = {
         "song": stage.song_id,
@@ -165,6 +200,7 @@ def write_dance(folder: Path, stage: Stage) -> list[Path]:
         "frame_rate_hz": stage.clip.frame_rate_hz,
         "quality": {name: measure["value"] for name, measure in stage.quality.items()},
         "wanted": {name: m for name, m in stage.quality.items() if m["wanted"]},
+        "licence": stage.provenance["licence"],
         "provenance": stage.provenance,
     }
     text = json.dumps(report, indent=2, sort_keys=True, ensure_ascii=False) + "\n"

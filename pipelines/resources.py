@@ -5,10 +5,15 @@ The only place that reads the environment.
 
 import json
 import os
+import zipfile
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from upath import UPath
 
 from assets import sources
@@ -78,8 +83,17 @@ class StudioFolder:
     def lost_stages(self, song: str, method: str) -> list[str]:
         """Names of a finished dance's files that are not there any more."""
         folder = self.dances / song
-        names = ("song.wav", f"{method}.usdc", f"{method}.usdz", f"{method}.json")
+        names = ("song.wav", f"{method}.usdc", f"{method}.usdz", f"{method}.json", *self._cast_files(folder, method))
         return [name for name in names if not (folder / name).is_file()]
+
+    @staticmethod
+    def _cast_files(folder: Path, method: str) -> list[str]:
+        """Names of what a dance by a character of another file consists of besides."""
+        try:
+            told = json.loads((folder / f"{method}.json").read_text())
+            return [f"{method}_character/character.usdc"] if "file" in told["provenance"].get("character", {}) else []
+        except (OSError, ValueError, KeyError, AttributeError):
+            return []
 
     @property
     def dagster_home(self) -> Path:
@@ -151,3 +165,22 @@ def pair_distance(settings: OpenClSettings) -> PairDistance:
     from kernels.opencl.pose_distance import PoseDistance
 
     return PoseDistance(cl.Context([pick_device(settings.device)]))
+
+
+class GraphMemory:
+    """Arrays the motion graph keeps in the lake; see :class:`assets.graph_memory.Memory`."""
+
+    def __init__(self, lake: Lake) -> None:
+        self._path = lake.root / "motion_graph.npz"
+
+    def recall(self) -> dict[str, NDArray[Any]] | None:
+        """Read what was kept."""
+        try:
+            with self._path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
+                return {name: kept[name] for name in kept.files}
+        except (OSError, ValueError, zipfile.BadZipFile, EOFError):
+            return None  # none yet, or damaged: everything is computed again
+
+    def keep(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Keep these instead of what was kept."""
+        write_beside(self._path, lambda file: np.savez(file, **arrays))  # type: ignore[arg-type]

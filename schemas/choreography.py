@@ -9,7 +9,7 @@ from schemas.table import Column, Table
 
 CHOREOGRAPHY = Table(
     name="choreography",
-    version=2,
+    version=3,
     meaning="One step: an interval of the song danced with an interval of a clip.",
     key=("song_id", "method_name", "step_index"),
     columns=(
@@ -21,6 +21,7 @@ CHOREOGRAPHY = Table(
         f.CLIP_ID,
         Column("clip_start_s", pa.float64(), "Start in the clip."),
         Column("clip_end_s", pa.float64(), "End in the clip."),
+        f.IS_MIRRORED,
         Column("has_seam", pa.bool_(), "Whether the step does not continue the one before in its clip."),
         Column("blend_s", pa.float32(), "Song time blended around the start; 0 without a seam."),
         f.WARP_RATIO,
@@ -50,7 +51,7 @@ DANCE_POSE = Table(
 
 FRAME_LINEAGE = Table(
     name="frame_lineage",
-    version=1,
+    version=2,
     meaning="Where one frame of a dance comes from.",
     key=("song_id", "method_name", "frame_index"),
     columns=(
@@ -59,8 +60,10 @@ FRAME_LINEAGE = Table(
         f.FRAME_INDEX,
         f.TIME_S,
         f.CLIP_ID,
+        f.IS_MIRRORED,
         Column("clip_time_s", pa.float64(), "Time in the dominant clip."),
         Column("blend_clip_id", pa.string(), "Partner of the blend; null where unblended.", is_optional=True),
+        Column("is_blend_mirrored", pa.bool_(), "Whether the partner is shown mirrored; false where unblended."),
         Column("blend_time_s", pa.float64(), "Time in the partner; null where unblended.", is_optional=True),
         Column("blend_weight_ratio", pa.float32(), "The partner's share, 0 to 0.5; 0 where unblended."),
         f.WARP_RATIO,

@@ -22,6 +22,11 @@ STATE = Column("state", pa.string(), "Whether the source was read or refused.", 
 REASON = Column("reason", pa.string(), "Why it was refused, one sentence; null when it was read.", is_optional=True)
 DURATION_S = Column("duration_s", pa.float64(), "Length; 0 when refused.")
 
+LABEL = Column("label", pa.string(), "What is danced or done, from clips.csv or the folder's name.")
+IS_LABELLED = Column("is_labelled", pa.bool_(), "Whether clips.csv says the label; else it is the folder's name.")
+STYLE = Column("style", pa.string(), "How it is done, from clips.csv; empty when not said.")
+LICENCE = Column("licence", pa.string(), "Licence of the recording, from clips.csv; empty when not said.")
+
 FRAME_INDEX = Column("frame_index", pa.int32(), "Frame of its clip or dance, from 0.")
 TIME_S = Column("time_s", pa.float64(), "Time from the clip's first frame or the song's first decoded sample.")
 ROOT_XYZ_M = Column("root_xyz_m", VECTOR, "World position of the root joint.")
@@ -36,6 +41,8 @@ CONFIDENCE_RATIO = Column("confidence", pa.float32(), "How sure the detector is,
 RHYTHM = Column("rhythm", pa.float32(), "Stops of the body, or onsets at beats, as bumps; the 99th percentile is 1.")
 INTENSITY = Column("intensity", pa.float32(), "Drive of the motion, or level of the music; the 99th percentile is 1.")
 SEGMENT_INDEX = Column("segment_index", pa.int32(), "Segment of its song, from 0.")
+
+IS_MIRRORED = Column("is_mirrored", pa.bool_(), "Whether the clip is shown mirrored, left for right.")
 
 WARP_RATIO = Column(
     "warp_ratio", pa.float32(), "Song time over clip time; above 1 the clip plays slower than recorded."

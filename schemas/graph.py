@@ -11,17 +11,20 @@ NODE_INDEX = Column("node_index", pa.int32(), "Node of the motion graph, from 0,
 
 MOTION_GRAPH_NODE = Table(
     name="motion_graph_node",
-    version=1,
+    version=2,
     meaning="One beat of one clip as a node of the motion graph.",
     key=("node_index",),
     columns=(
         NODE_INDEX,
         f.CLIP_ID,
+        f.IS_MIRRORED,
         f.BEAT_INDEX,
         f.TIME_S,
         Column("next_node_index", pa.int32(), "The clip's next beat; -1 at its last."),
         Column("label", pa.string(), "Label of the clip."),
         Column("accent_score", pa.float32(), "How plainly the body stops at this beat, 0 to 1."),
+        Column("jerk_m_per_s3", pa.float32(), "Roughest moment of the clip around this beat."),
+        Column("clip_jerk_m_per_s3", pa.float32(), "Its clip's 99th percentile of jerk."),
         Column("is_kept", pa.bool_(), "False where pruning found that a dance could not go on from here."),
     ),
 )

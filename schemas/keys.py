@@ -71,6 +71,24 @@ def clip_key(folders: Sequence[str], stem: str) -> str:
     return f"{session_key(folders)}-{slug(stem, longest=_LONGEST_TAKE)}"
 
 
+_MIRRORED = "~mirrored"
+
+
+def mirrored(clip_id: str) -> str:
+    """Name of a clip's mirror image among the clips of a dance; tables say the clip and a flag instead."""
+    return clip_id + _MIRRORED
+
+
+def is_mirrored(name: str) -> bool:
+    """Whether a name is that of a mirror image."""
+    return name.endswith(_MIRRORED)
+
+
+def source_clip(name: str) -> str:
+    """Key of the clip that a name stands for, mirrored or not."""
+    return name.removesuffix(_MIRRORED)
+
+
 def song_key(stem: str) -> str:
     """Key of a song from its file's name without suffix."""
     return slug(stem)

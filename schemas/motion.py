@@ -9,7 +9,7 @@ from schemas.table import Column, Table
 
 CLIP = Table(
     name="clip",
-    version=3,
+    version=4,
     meaning="One file of motion under clips/.",
     key=("clip_id", "path"),
     columns=(
@@ -20,10 +20,11 @@ CLIP = Table(
         Column("frame_rate_hz", pa.float64(), "Frames a second, cleaned of rounding; 0 when refused."),
         Column("frame_count", pa.int32(), "Frames; 0 when refused."),
         f.DURATION_S,
-        Column("label", pa.string(), "What is danced or done, from clips.csv or the folder's name."),
-        Column("style", pa.string(), "How it is done, from clips.csv; empty when not said."),
+        f.LABEL,
+        f.IS_LABELLED,
+        f.STYLE,
         Column("subject", pa.string(), "Who was recorded, from clips.csv; empty when not said."),
-        Column("licence", pa.string(), "Licence of the recording, from clips.csv; empty when not said."),
+        f.LICENCE,
         Column("performed_to", pa.string(), "Song it was danced to, from clips.csv; empty when not said."),
         Column("performed_offset_s", pa.float64(), "Time of that song at the first frame, from clips.csv; else 0."),
         f.STATE,

@@ -82,6 +82,7 @@ class MotionGraphSettings(_Checked):
         0.0, "Equation 19: a transition is allowed below this ratio; 0: the built-in value.", least=0
     )
     neighbours: int = key(20, "Transitions kept for each beat.", least=1)
+    mirror: bool = key(False, "Dance clips mirrored, left for right, as well: twice the catalogue.")
     prune: str = key(
         "reach",
         "'reach' (a dance can go on for ever), 'dead_ends' (the document's), 'component' or 'none'.",
@@ -140,12 +141,32 @@ class MatchPathSettings(_Checked):
         "Price of a seam between poses beyond the thresholds; 0: as few of them as can be, before any cost counts.",
         least=0,
     )
+    other_starts: int = key(
+        4, "Other places of each matched clip that are tried too, where they match nearly as well.", least=0, most=50
+    )
     snap_loss_ratio: float = key(
         0.05,
         "A piece starts on a beat of its clip where that loses less than this share of its score.",
         least=0,
         most=1,
     )
+
+
+@dataclass(frozen=True)
+class SearchSettings(_Checked):
+    """How motions are made searchable."""
+
+    has_travel: bool = key(True, "Where the root goes and turns counts; false: a walk on the spot is a walk.")
+    window_s: float = key(4.0, "Length of the windows long clips are searched by.", least=0.5, most=8)
+    longest_whole_s: float = key(6.0, "A clip no longer than this is one window.", least=0.5, most=16)
+    labels: str = key(
+        "clips.csv",
+        "What the encoder learns from: labels of 'clips.csv', 'folders' too, or 'none'.",
+        values=("clips.csv", "folders", "none"),
+    )
+    training_windows: int = key(4000, "Windows the encoder learns from at most.", least=2, most=100000)
+    training_steps: int = key(250, "Steps of its training at most.", least=1, most=100000)
+    seed: int = key(0, "Where its training begins; another seed, another encoder.", least=0)
 
 
 @dataclass(frozen=True)
@@ -192,6 +213,11 @@ class DanceSettings(_Checked):
     blend_s: float = key(
         0.4, "Song time over which two clips are blended, centred on the beat of the seam.", least=0, most=2
     )
+    blend_shape: str = key(
+        "slerp",
+        "'slerp' (eased), 'linear_slerp' (the document's) or 'inertial' (springs both ways): docs/seams.md.",
+        values=("slerp", "linear_slerp", "inertial"),
+    )
     lock_feet: bool = key(True, "Keep feet where they stand: root and legs give way to contacts of the clips.")
 
 
@@ -224,6 +250,7 @@ class Settings:
     music_segment: MusicSegmentSettings = field(default_factory=MusicSegmentSettings)
     matching: MatchingSettings = field(default_factory=MatchingSettings)
     match_path: MatchPathSettings = field(default_factory=MatchPathSettings)
+    search: SearchSettings = field(default_factory=SearchSettings)
     basic_motion: BasicMotionSettings = field(default_factory=BasicMotionSettings)
     choreography_model: ChoreographyModelSettings = field(default_factory=ChoreographyModelSettings)
     hmm_path: HmmPathSettings = field(default_factory=HmmPathSettings)
@@ -249,4 +276,5 @@ class Brief(_Checked):
     pin: tuple[PinWish, ...] = key((), "What is to be danced when: one [[pin]] each, a place and a wish.")
     pins: str = key("hard", "'hard': kept or refused; 'soft': a price where not kept.", values=("hard", "soft"))
     allow: tuple[str, ...] = key((), "Licences of the clips that may be danced; empty for all.")
+    character: str = key("", "Whose body is danced with: a clip's key, or a rigged USD file beside the songs.")
     beats: BeatsBrief = field(default_factory=BeatsBrief)

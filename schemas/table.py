@@ -49,6 +49,7 @@ class Column:
 # Longest suffix first: `_m_per_s` before `_s`.
 UNIT_SUFFIXES: dict[str, str] = {
     "_rad_per_s": "rad/s",
+    "_m_per_s3": "m/s3",
     "_m_per_s2": "m/s2",
     "_m_per_s": "m/s",
     "_xyz_m": "m",

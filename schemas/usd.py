@@ -28,3 +28,15 @@ PACKAGE_AUDIO_SUFFIX = ".wav"
 
 # Key of the default prim's customData that holds the provenance.
 PROVENANCE_KEY = "odori"
+
+# Where each frame comes from: attributes of the animation, sampled at the time codes where their value changes. Names
+# and texts are held from one sample to the next; numbers between samples lie on a line.
+LINEAGE: dict[str, tuple[str, str]] = {
+    "odori:clip": ("token", "Clip that the frame shows, the dominant one of a blend."),
+    "odori:clipTime": ("float", "Seconds from that clip's first frame."),
+    "odori:blendClip": ("token", "Partner of the blend; empty where unblended."),
+    "odori:blendTime": ("float", "Seconds from the partner's first frame; 0 where unblended."),
+    "odori:blendWeight": ("float", "The partner's share, 0 to 0.5; 0 where unblended."),
+    "odori:warp": ("float", "Song time over clip time."),
+    "odori:step": ("string", "The step of the choreography, as JSON: its place, pin and costs."),
+}

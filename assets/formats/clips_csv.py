@@ -8,6 +8,7 @@ import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from assets.formats.errors import FormatError
 
@@ -27,6 +28,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 class Facts:
     """What is known of one clip; empty texts where nothing was said.
 
+    ``is_labelled`` is false where the label only stands in for one that was not said.
     ``performed_to`` is the song it was danced to (key, file name or stem; ``none`` for no song of the studio),
     ``performed_offset_s`` the time of the song at the clip's first frame.
     """
@@ -37,6 +39,7 @@ class Facts:
     licence: str = ""
     performed_to: str = ""
     performed_offset_s: float = 0.0
+    is_labelled: bool = True
 
 
 def is_clips_csv(name: str) -> bool:
@@ -83,7 +86,7 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
             file = (row.get(chosen["file"]) or "").strip().replace("\\", "/")
             if not file:
                 continue
-            texts = {k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"}
+            texts: dict[str, Any] = {k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"}
             offset_s = _seconds(texts.pop("performed_offset_s", ""), path, rows.line_num)
             said = Facts(**texts, performed_offset_s=offset_s)
             if facts.setdefault(file, said) != said:

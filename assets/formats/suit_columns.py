@@ -24,6 +24,12 @@ from kernels.types import Float
 MAX_BYTES = 1 << 30
 # Two hours of 17 sensors at 240 Hz; a Parquet file of a few bytes can claim far more.
 MAX_ROWS = 30_000_000
+_MAGIC = {
+    b"\x1f\x8b": "a file packed by gzip (unpack it)",
+    b"PK\x03\x04": "a zip archive or a spreadsheet (unpack it)",
+    b"\x28\xb5\x2f\xfd": "a file packed by Zstandard (unpack it)",
+    b"\x02P": "C3D markers (odori reads sensors with place and orientation)",
+}
 _AGAIN = "\0"
 _NOTHING = ["", "nan", "NaN", "NAN", "NA", "null", "NULL", "None", "-"]
 _TRUE, _FALSE = {"true", "t", "yes", "y", "1", "1.0", "ok", "valid"}, {"false", "f", "no", "n", "0", "0.0", "invalid"}
@@ -236,6 +242,12 @@ def _ragged(data: bytes, path: str, separator: str, n_columns: int, header_line:
 
 
 def _shown(data: bytes) -> str:
+    """Say what a file begins with."""
+    for magic, name in _MAGIC.items():
+        if data.startswith(magic):
+            return name
+    if b"\0" in data[:4096]:
+        return "binary data"
     start = data[:40].split(b"\n")[0]
     return repr(start.decode("utf-8", "replace")) if start else "nothing"
 

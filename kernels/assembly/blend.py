@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from kernels import rotation
+from kernels.assembly.joins import PROBE_S, SHAPES, Side, ease
 from kernels.assembly.timing import clock
 from kernels.skeleton import kinematics
 from kernels.types import Choreography, Clip, Float, Int, Skeleton
@@ -86,21 +87,6 @@ def sample(clip: Clip, time_s: Float) -> tuple[Float, Float]:
     return found[:, :3], rotation.normalize(found[:, 3:].reshape(len(frame), -1, 4))
 
 
-def ease(x: Float) -> Float:
-    """Rise from 0 to 1 with no slope at either end: 3x^2 - 2x^3 on [0, 1] (Kovar et al. 2002).
-
-    Parameters
-    ----------
-    x : (...) float
-
-    Returns
-    -------
-    (...) float64, 0 to 1; held beyond [0, 1]
-    """
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3 - 2 * x)
-
-
 def turn(root_xyz_m: Float, rotation_wxyz: Float, angle_rad: float) -> tuple[Float, Float]:
     """Turn a motion about the vertical through the origin: (F, 3) and (F, J, 4) local.
 
@@ -129,14 +115,20 @@ def _lowest_m(skeleton: Skeleton, root_xyz_m: Float, rotation_wxyz: Float) -> Fl
 
 
 def assemble(
-    steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton, frame_rate_hz: float, duration_s: float
+    steps: Choreography,
+    clips: Mapping[str, Clip],
+    *,
+    skeleton: Skeleton,
+    frame_rate_hz: float,
+    duration_s: float,
+    shape: str = "slerp",
 ) -> Dance:
     """Dance a choreography.
 
     Between the boundaries of steps the clips are played by the clock of :mod:`kernels.assembly.timing`, so every
     boundary falls on its song time. At a seam the following clip is turned and moved so that its root stands where the
-    one before stood and faces where it faced; over the blend both are played at the same pace and mixed by slerp,
-    half and half on the seam. The dance starts at the origin, facing +Z.
+    one before stood and faces where it faced; over the blend both are played at the same pace and joined by ``shape``.
+    The dance starts at the origin, facing +Z.
 
     After JP5778523B2, equations 21, 22 and 27; centred blends, blended root travel, feet kept at their height through a
     blend and the smooth clock are ours.
@@ -148,6 +140,7 @@ def assemble(
     skeleton : Skeleton of J joints
     frame_rate_hz : float, > 0
     duration_s : float, seconds, > 0
+    shape : name of one of :data:`kernels.assembly.joins.SHAPES`
 
     Returns
     -------
@@ -157,8 +150,10 @@ def assemble(
     Raises
     ------
     ValueError
-        If there is no step, a clip is missing, or a rate or duration is not > 0.
+        If there is no step, a clip is missing, the shape is unknown, or a rate or duration is not > 0.
     """
+    if shape not in SHAPES:
+        raise ValueError(f"shape: want one of {', '.join(SHAPES)}, got {shape!r}")
     if not (frame_rate_hz > 0 and duration_s > 0):
         raise ValueError(f"frame_rate_hz, duration_s: want > 0, got {frame_rate_hz}, {duration_s}")
     missing = sorted(set(steps.clip_id) - set(clips))
@@ -178,6 +173,8 @@ def assemble(
     clip_time, partner_time = np.zeros(n_frames), np.full(n_frames, np.nan)
     partner, weight = np.full(n_frames, -1), np.zeros(n_frames)
     place, heading = np.zeros(3), 0.0
+    probe = np.array([-PROBE_S, 0.0, PROBE_S])
+    edge_root, edge_rot = np.zeros((3, 3)), np.zeros((3, n_joints, 4))
     for a, b in zip(start, end, strict=True):
         clip = clips[steps.clip_id[a]]
         seam_s, next_seam_s = steps.song_start_s[a], steps.song_end_s[b - 1]
@@ -185,30 +182,37 @@ def assemble(
         after = half[b] if b < len(half) else 0.0
         is_here = (time_s >= seam_s - before) | (a == 0)
         span = np.flatnonzero(is_here & ((time_s < next_seam_s + after) | (b == len(half))))
-        # One more sample at each seam: where this phrase takes over, and where it hands over.
-        edges = np.array([motion.motion_s[a], motion.motion_s[b]])
+        # More samples at each seam: where this phrase takes over, and where it hands over.
+        edges = motion.at(np.concatenate([seam_s + probe, next_seam_s + probe]))
         # A blend that reaches past a clip's end is held at its last frame, and says so.
         clip_s = np.clip(
             steps.clip_start_s[a] + np.append(motion_s[span], edges) - motion.motion_s[a], 0.0, clip.duration_s
         )
         xyz, q = sample(clip, clip_s)
-        angle = heading - float(rotation.heading_rad(q[-2, 0]))
+        angle = heading - float(rotation.heading_rad(q[-5, 0]))
         xyz, q = turn(xyz, q, angle)
-        shift = (place - xyz[-2]) * np.array([1.0, 0.0, 1.0])
+        shift = (place - xyz[-5]) * np.array([1.0, 0.0, 1.0])
         xyz = xyz + shift
-        place, heading = xyz[-1], float(rotation.heading_rad(q[-1, 0]))
-        xyz, q, clip_s = xyz[:-2], q[:-2], clip_s[:-2]
+        place, heading = xyz[-2], float(rotation.heading_rad(q[-2, 0]))
+        entry_root, entry_rot = xyz[-6:-3], q[-6:-3]
+        next_root, next_rot = xyz[-3:], q[-3:]
+        xyz, q, clip_s = xyz[:-6], q[:-6], clip_s[:-6]
 
         mixed = time_s[span] < seam_s + before
         alone, both = span[~mixed], span[mixed]
         root[alone], rot[alone], clip_time[alone] = xyz[~mixed], q[~mixed], clip_s[~mixed]
         if len(both):
-            share = ease((time_s[both] - seam_s + before) / (2 * before))
+            x = (time_s[both] - seam_s) / before
+            share = ease((x + 1) / 2)
             low_m = (1 - share) * _lowest_m(skeleton, root[both], rot[both]) + share * _lowest_m(
                 skeleton, xyz[mixed], q[mixed]
             )
-            root[both] += share[:, None] * (xyz[mixed] - root[both])
-            rot[both] = rotation.slerp(rot[both], q[mixed], share[:, None])
+            root[both], rot[both] = SHAPES[shape](
+                x,
+                before,
+                Side(root[both], rot[both], edge_root, edge_rot),
+                Side(xyz[mixed], q[mixed], entry_root, entry_rot),
+            )
             # Knees bent halfway do not carry hips at half the height: the lower foot decides instead.
             root[both, 1] += low_m - _lowest_m(skeleton, root[both], rot[both])
             leads = time_s[both] + 1e-9 >= seam_s
@@ -216,6 +220,7 @@ def assemble(
             partner_time[both] = np.where(leads, clip_time[both], clip_s[mixed])
             clip_time[both] = np.where(leads, clip_s[mixed], clip_time[both])
             weight[both] = np.minimum(share, 1 - share)
+        edge_root, edge_rot = next_root, next_rot
     rot = rotation.continuous(rot)
     position, _ = kinematics.forward(skeleton, root, rot)
     return Dance(frame_rate_hz, root, rot, position, Lineage(step, clip_time, partner, partner_time, weight))

@@ -7,24 +7,13 @@ speed), and chance is measured on the same dance: raw beat alignment near 0.25 i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kernels.assembly.blend import Dance, assemble, sample
-from kernels.assembly.feet import clip_contacts, planted_feet
-from kernels.assembly.timing import clock
-from kernels.motion import contacts
-from kernels.motion.velocity import jerk, kinematic_beats
-from kernels.skeleton import grounding, kinematics
-from kernels.types import Choreography, Clip, Float, Skeleton
-
-Bool = NDArray[np.bool_]
-
-
-UNSEEN_SLIDE_CM_PER_S = 0.5
-"""Slide of planted feet that nobody sees, whatever the clips do: a twentieth of what captured clips have."""
+from kernels.assembly.blend import Dance
+from kernels.motion.velocity import kinematic_beats
+from kernels.types import Choreography, Float
 
 
 @dataclass(frozen=True)
@@ -127,24 +116,28 @@ def beat_measures(dance: Dance, music_beat_s: Float, *, seed: int = 0, n_shifts:
     Returns
     -------
     list of Measure
-        Beat F at 70 ms, alignment corrected for chance, its p-value (share of shifts at least as good, counting the
-        dance itself).
+        Beat F at 70 ms and alignment corrected for chance, each with its chance level and its p-value (share of shifts
+        at least as good, counting the dance itself).
     """
     duration_s = float(dance.time_s[-1]) if len(dance.time_s) else 0.0
     moved_s = kinematic_beats(dance.position_xyz_m, dance.frame_rate_hz) / dance.frame_rate_hz
     music_s = music_beat_s[(music_beat_s >= 0) & (music_beat_s <= duration_s)]
-    score = beat_alignment(moved_s, music_s)
+    score, f = beat_alignment(moved_s, music_s), f_measure(moved_s, music_s)
     rng = np.random.default_rng(seed)
+    by_chance = np.zeros((n_shifts, 2))
     if len(moved_s) and len(music_s):
-        chance = np.array(
-            [beat_alignment(block_shifted(moved_s, duration_s, rng=rng), music_s) for _ in range(n_shifts)]
-        )
-    else:
-        chance = np.zeros(n_shifts)
-    p = (1 + int(np.sum(chance >= score))) / (1 + n_shifts)
+        for i in range(n_shifts):
+            shifted_s = block_shifted(moved_s, duration_s, rng=rng)
+            by_chance[i] = beat_alignment(shifted_s, music_s), f_measure(shifted_s, music_s)
+    chance = by_chance[:, 0]
+    p, f_p = (
+        (1 + int(np.sum(level >= got))) / (1 + n_shifts) for level, got in zip(by_chance.T, (score, f), strict=True)
+    )
     mean = float(chance.mean())
     return [
-        Measure("beat_f_ratio", f_measure(moved_s, music_s)),
+        Measure("beat_f_ratio", f),
+        Measure("beat_f_chance_ratio", float(by_chance[:, 1].mean())),
+        Measure("beat_f_p_probability", f_p, "below 0.01", f_p < 0.01),
         Measure("beat_alignment_ratio", score),
         Measure("beat_alignment_chance_ratio", mean),
         Measure(
@@ -224,79 +217,6 @@ def _crossing_s(dance: Dance, step: int, clip_s: float) -> float | None:
     return float(time_s[0] + (clip_s - passed_s[0]) / slope) if slope > 0 else None
 
 
-def seam_measures(
-    dance: Dance, steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton, reach_s: float = 0.1
-) -> list[Measure]:
-    """Judge the seams: peak jerk there over the 99th percentile inside the source clips at the dance's own pace.
-
-    A plain cut (the same choreography without blends) is measured beside it: a blend must do better.
-
-    Parameters
-    ----------
-    dance, steps, clips, skeleton : as :func:`kernels.assembly.blend.assemble` has them
-    reach_s : float, seconds
-        Looked at on either side of the blend as well.
-
-    Returns
-    -------
-    list of Measure
-        Count; the 95th percentile of the ratio over seams, which is judged (an actual seam: the worst of up to
-        twenty), its median and worst; the 95th percentile of plain cuts. Zeros without seams.
-    """
-    seam = np.flatnonzero(steps.has_seam)
-    nothing = [Measure("seam_count", float(len(seam)))]
-    if len(seam) == 0 or len(dance.time_s) < 4:
-        return [*nothing, Measure("seam_jerk_ratio", 0.0, "at most 1.5, and below a plain cut", True)]
-    reference = float(np.percentile(_source_jerk(dance, steps, clips, skeleton), 99)) or 1.0
-    cut = assemble(
-        replace(steps, blend_s=np.zeros_like(steps.blend_s)),
-        clips,
-        skeleton=skeleton,
-        frame_rate_hz=dance.frame_rate_hz,
-        duration_s=float(dance.time_s[-1]) or 1.0 / dance.frame_rate_hz,
-    )
-    at_s = steps.song_start_s[seam]
-    width_s = steps.blend_s[seam] / 2 + reach_s
-    blended = _peaks(jerk(dance.position_xyz_m, dance.frame_rate_hz), dance.time_s, at_s, width_s) / reference
-    plain = _peaks(jerk(cut.position_xyz_m, cut.frame_rate_hz), cut.time_s, at_s, width_s) / reference
-    high, plain_high = (float(np.percentile(peak, 95, method="higher")) for peak in (blended, plain))
-    # A plain cut hardly rougher than the clips themselves leaves nothing to better.
-    is_better = high < plain_high or max(high, plain_high) <= 1.1
-    return [
-        *nothing,
-        Measure("seam_jerk_ratio", high, "at most 1.5, and below a plain cut", high <= 1.5 and is_better),
-        Measure("seam_jerk_median_ratio", float(np.median(blended))),
-        Measure("seam_jerk_worst_ratio", float(blended.max())),
-        Measure("seam_jerk_plain_cut_ratio", plain_high),
-    ]
-
-
-def _peaks(values: Float, time_s: Float, at_s: Float, width_s: Float) -> Float:
-    """Largest value within ``width_s`` of each moment."""
-    return np.array(
-        [
-            values[np.abs(time_s - s) <= max(w, 1.5 * (time_s[1] - time_s[0]))].max(initial=0.0)
-            for s, w in zip(at_s, width_s, strict=True)
-        ]
-    )
-
-
-def _source_jerk(dance: Dance, steps: Choreography, clips: Mapping[str, Clip], skeleton: Skeleton) -> Float:
-    """Jerk of every frame if its clip had gone on unblended, at the dance's own pace."""
-    motion = clock(steps)
-    motion_s = motion.at(dance.time_s)
-    start = np.flatnonzero(np.append(True, steps.has_seam[1:]))
-    end = np.append(start[1:], len(steps.clip_id))
-    found = []
-    for a, b in zip(start, end, strict=True):
-        frame = np.flatnonzero((dance.lineage.step_index >= a) & (dance.lineage.step_index < b))
-        if len(frame) < 4:
-            continue
-        root, rot = sample(clips[steps.clip_id[a]], steps.clip_start_s[a] + motion_s[frame] - motion.motion_s[a])
-        found.append(jerk(kinematics.forward(skeleton, root, rot)[0], dance.frame_rate_hz)[1:-2])
-    return np.concatenate(found) if found else np.ones(1)
-
-
 def catalogue_measures(steps: Choreography, catalogue_s: Mapping[str, float]) -> list[Measure]:
     """Report what share of the catalogue's time is danced, and how long the longest repeated run is.
 
@@ -343,66 +263,3 @@ def _longest_repeat(word: list[str]) -> int:
         best = max(best, int(row.max(initial=0)))
         previous = row
     return best
-
-
-def _danced_frames(dance: Dance, steps: Choreography, clip_id: str, clip: Clip) -> Bool:
-    """Mark the frames of a clip that a dance passes, (F,): all from one frame of the dance to the next.
-
-    Not only the nearest to each: a clip recorded faster than the stage would keep no two neighbours.
-    """
-    step = dance.lineage.step_index
-    phrase = np.cumsum(steps.has_seam)[step]
-    goes_on = (phrase[1:] == phrase[:-1]) & (np.array(steps.clip_id, object)[step[1:]] == clip_id)
-    before = np.flatnonzero(goes_on)
-    at = dance.lineage.clip_time_s * clip.frame_rate_hz
-    low, high = np.floor(at[before] + 1e-6), np.ceil(at[before + 1] - 1e-6) + 1
-    edge = np.zeros(clip.n_frames + 1, int)
-    np.add.at(edge, np.clip(low, 0, clip.n_frames).astype(int), 1)
-    np.add.at(edge, np.clip(high, 0, clip.n_frames).astype(int), -1)
-    return np.asarray(np.cumsum(edge)[:-1] > 0)
-
-
-def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
-    """Judge the feet: slide while planted beyond the source clips' own, and depth below the floor.
-
-    Which foot is planted when is taken from the source clips through the lineage: blending must not get to decide what
-    counts as contact. The source's own slide is that of every frame danced past, whatever the rate it was recorded at.
-
-    Parameters
-    ----------
-    dance, steps, clips : as :func:`kernels.assembly.blend.assemble` has them, on the canonical skeleton
-
-    Returns
-    -------
-    list of Measure
-        Centimetres per second of contact, and centimetres.
-    """
-    planted = planted_feet(dance, steps, clips)
-    source_m = source_s = 0.0
-    for clip_id in dict.fromkeys(steps.clip_id):
-        clip = clips[clip_id]
-        position, _ = kinematics.place(clip)
-        found = clip_contacts(clip, position)
-        used = _danced_frames(dance, steps, clip_id, clip)[:, None]
-        danced = replace(found, ankle=found.ankle & used, toes=found.toes & used)
-        stood_s = float(danced.foot.sum()) / clip.frame_rate_hz
-        slide = contacts.foot_slide(
-            position[:, grounding.ANKLES], position[:, grounding.TOES], danced, frame_rate_hz=clip.frame_rate_hz
-        )
-        source_m, source_s = source_m + slide * stood_s, source_s + stood_s
-    feet = dance.position_xyz_m[:, grounding.ANKLES], dance.position_xyz_m[:, grounding.TOES]
-    ours = 100 * contacts.foot_slide(*feet, planted, frame_rate_hz=dance.frame_rate_hz)
-    source = 100 * source_m / source_s if source_s else 0.0
-    limit = max(0.2 * source, UNSEEN_SLIDE_CM_PER_S)
-    depth_cm = 100 * max(float(np.max(-point[..., 1], initial=0.0)) for point in feet)
-    return [
-        Measure("foot_slide_cm_per_s", ours),
-        Measure("source_foot_slide_cm_per_s", source),
-        Measure(
-            "added_foot_slide_cm_per_s",
-            ours - source,
-            f"at most {limit:.2f}, a fifth of the source's own or what nobody sees",
-            ours - source <= limit,
-        ),
-        Measure("penetration_cm", depth_cm, "at most 1", depth_cm <= 1.0),
-    ]

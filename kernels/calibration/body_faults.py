@@ -14,16 +14,18 @@ from numpy.typing import NDArray
 
 from kernels import rotation
 from kernels.calibration.joints import PairSolution
-from kernels.calibration.pairs import find_swap, pair_residuals, spanning_tree
-from kernels.calibration.records import JOINTS, PARENT, SENSORS, Cleaned, Finding
+from kernels.calibration.pairs import find_swap, pair_costs, pair_residuals, spanning_tree
+from kernels.calibration.records import JOINTS, PARENT, SENSORS, Cleaned, Finding, Severity
 from kernels.types import Float
 
 _MOST_FRAMES, _LEAST_FRAMES = 2000, 200
 _ENOUGH_FRAMES, _GOOD_FRAMES = 240, 960
 _SWAP_RATIO = 0.8  # one exchange: at most 0.61 where labels are exchanged, at least 1.6 where they are right
+_MOST_SWAPS = 4
 _TREE_RATIO, _TREE_M = 3.0, 0.010
 _BETTER_RATIO = 0.5
 _SIDE = 0.3
+_LOOSE_M, _STRANGE_M = 0.030, 0.060
 
 ORDERS: dict[str, Callable[[Float], Float]] = {
     "inverted (world to sensor)": rotation.inv,
@@ -44,7 +46,16 @@ _MOVES: dict[str, str] = {
 
 
 def move_to_repeat(joint: str) -> str:
-    """Say which movement shows a joint, in a performer's words."""
+    """Say which movement shows a joint, in a performer's words.
+
+    Parameters
+    ----------
+    joint : str, the child segment
+
+    Returns
+    -------
+    str
+    """
     return _MOVES[joint[2:] if joint[:2] in ("l_", "r_") else joint]
 
 
@@ -66,14 +77,18 @@ def find_body_faults(cleaned: Cleaned, pairs: list[PairSolution]) -> tuple[Findi
         return ()
     turned = np.moveaxis(cleaned.recording.rotation_wxyz[chosen], 1, 0)
     place = np.ascontiguousarray(np.moveaxis(cleaned.recording.position_xyz_m[chosen], 1, 0))
-    residual = pair_residuals(rotation.to_matrix(turned), place)
+    matrices = rotation.to_matrix(turned)
+    residual = pair_residuals(matrices, place)
     order = _rotation_order(turned, place, residual)
     if order:
         return order
-    return (
-        *(_labels(residual) or (*_sides(cleaned, pairs, chosen), *_tree(residual))),
-        *_movement(pairs),
-    )
+    labels = _labels(residual)
+    if labels:
+        return (*labels, *_movement(pairs))
+    tree = _tree(residual, spanning_tree(pair_costs(matrices, place)))
+    is_in_metres = all(finding.sensor is not None for finding in cleaned.findings)
+    loose = _loose(pairs) if is_in_metres else []
+    return (*_sides(cleaned, pairs, chosen), *tree, *loose, *_movement(pairs))
 
 
 def _frames(cleaned: Cleaned) -> NDArray[np.intp]:
@@ -104,15 +119,21 @@ def _rotation_order(turned: Float, place: Float, residual: Float) -> tuple[Findi
 
 
 def _labels(residual: Float) -> tuple[Finding, ...]:
-    a, b, ratio = find_swap(residual, PARENT)
-    if ratio >= _SWAP_RATIO:
-        return ()
-    one, other = SENSORS[a], SENSORS[b]
-    sentence = (
-        f"{one}, {other}: want each sensor on its own segment, got two that fit exchanged (joints {1 / ratio:.1f} "
-        f"times closer); exchange the labels {one} and {other}"
-    )
-    return (Finding("error", one, None, sentence),)
+    """Find labels that are exchanged: two, and after those two others, as long as that helps."""
+    found: list[Finding] = []
+    order = np.arange(len(SENSORS))
+    while len(found) < _MOST_SWAPS:
+        a, b, ratio = find_swap(residual[np.ix_(order, order)], PARENT)
+        if ratio >= _SWAP_RATIO:
+            break
+        one, other = SENSORS[a], SENSORS[b]
+        sentence = (
+            f"{one}, {other}: want each sensor on its own segment, got two that fit exchanged (joints {1 / ratio:.1f} "
+            f"times closer); {'then ' if found else ''}exchange the labels {one} and {other}"
+        )
+        found.append(Finding("error", one, None, sentence))
+        order[[a, b]] = order[[b, a]]
+    return tuple(found)
 
 
 def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]) -> tuple[Finding, ...]:
@@ -146,11 +167,12 @@ def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]
     else:
         return ()
     sentence = f"{sensor}: want left sensors on the left, got {got}; exchange l_ and r_ of {what}"
+    if sensor == "l_shoulder" and legs in what:
+        sentence += ", or, if the labels are right, set the tracker's hemisphere: every position is mirrored"
     return (Finding("error", sensor, None, sentence),)
 
 
-def _tree(residual: Float) -> tuple[Finding, ...]:
-    edges = set(spanning_tree(residual))
+def _tree(residual: Float, edges: list[tuple[int, int]]) -> tuple[Finding, ...]:
     found = []
     for k in range(1, len(PARENT)):
         if (PARENT[k], k) in edges:
@@ -165,6 +187,22 @@ def _tree(residual: Float) -> tuple[Finding, ...]:
             )
             found.append(Finding("warning", SENSORS[k], None, sentence))
     return tuple(found)
+
+
+def _loose(pairs: list[PairSolution]) -> list[Finding]:
+    """Sensors that do not move with the body they are said to be on."""
+    found = []
+    for name, above, pair in zip(JOINTS, PARENT[1:], pairs, strict=True):
+        if not pair.sigma_m > _LOOSE_M or not pair.weight.any():
+            continue
+        severity: Severity = "error" if pair.sigma_m > _STRANGE_M else "warning"
+        sentence = (
+            f"{name}: want a sensor that moves with {SENSORS[above]} about one point, got {1000 * pair.sigma_m:.0f} mm "
+            f"between what the two say of it; check the straps and labels of {name} and {SENSORS[above]}, and record "
+            "again"
+        )
+        found.append(Finding(severity, name, None, sentence))
+    return found
 
 
 def _movement(pairs: list[PairSolution]) -> list[Finding]:

@@ -51,7 +51,7 @@ def advise(joint: str, *, rank: int, least_motion_rad: float, residual_sigma_m: 
     if rank < 2:
         words.append(f"{joint} did not turn ({degrees:.1f} degrees): {move_to_repeat(joint)}")
     elif rank == 2 or degrees < _MEDIUM_DEG:
-        words.append(f"{joint} turned about one axis only {degrees:.1f} degrees: {move_to_repeat(joint)}")
+        words.append(f"{joint} turned only {degrees:.1f} degrees about its weakest axis: {move_to_repeat(joint)}")
     if residual_sigma_m > _MEDIUM_M:
         words.append(f"its sensors slide ({1000 * residual_sigma_m:.0f} mm): strap them tighter, nearer to the bone")
     return "; ".join(words)

@@ -27,8 +27,8 @@ UNSEEN = 1e-3
 """A direction with 1 - m_k below this, 2.6 degrees of movement, is not seen."""
 
 _ROUNDS = 5
-_TUKEY = 6.4
-_NORM_3D = 1.538  # median length of a vector of three independent normal components, in their deviation
+TUKEY = 6.4
+NORM_3D = 1.538  # median length of a vector of three independent normal components, in their deviation
 _SHRINK, _LEVER_M = 0.4, 0.1
 
 
@@ -141,7 +141,7 @@ def closed_form(
     apart = np.matvec(R_i, c_i) - np.matvec(R_j, c_j) - d
     residual = np.sqrt(np.sum(apart * apart, axis=-1))
     used = weight > 0
-    sigma = float(np.median(residual[used])) / _NORM_3D if used.any() else float("inf")
+    sigma = float(np.median(residual[used])) / NORM_3D if used.any() else float("inf")
     return PairSolution(c_i, c_j, spread, U, V, int(rank), residual, sigma, weight)
 
 
@@ -204,7 +204,7 @@ def solve_joints(cleaned: Cleaned) -> list[PairSolution]:
 
 
 def _tukey(solution: PairSolution, is_good: Bools) -> Float:
-    cut = max(_TUKEY * solution.sigma_m, 1e-9)
+    cut = max(TUKEY * solution.sigma_m, 1e-9)
     return np.where(is_good, np.maximum(1.0 - (solution.residual_m / cut) ** 2, 0.0) ** 2, 0.0)
 
 

@@ -111,7 +111,8 @@ class Cleaned:
     Parameters
     ----------
     recording : Recording
-        Filtered, every value finite, rotations unit and continuous in sign; ``is_valid`` as it was received.
+        Filtered, every value finite, rotations unit and continuous in sign; ``is_valid`` as it was received, but for
+        readings that say nothing (:mod:`kernels.calibration.silence`).
     is_filled : (F, S) bool
         Entries that were missing or judged an outlier, and were interpolated.
     position_noise_m : (S,) float64, metres

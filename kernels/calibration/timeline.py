@@ -17,6 +17,8 @@ from kernels.types import Float, Int
 
 _COMMON_HZ = (20, 24, 25, 30, 40, 48, 50, 60, 75, 80, 90, 100, 120, 144, 150, 160, 180, 200, 240)
 _LONGEST_PAUSE_S = 5.0
+_LEAST_STEP_S, _MOST_STEP_S = 0.001, 0.2
+_FINER = {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}
 # Share of a step: times this near to the grid are on it; steps this short are a burst.
 _ON_GRID, _BURST = 0.25, 0.25
 
@@ -70,6 +72,12 @@ def timeline(time_s: Float) -> Timeline:
     if (step < 0).any():
         at = int(np.flatnonzero(step < 0)[0]) + 1
         raise ValueError(f"time_s: want rising times, got {time_s[at]:g} after {time_s[at - 1]:g} at sample {at}")
+    usual_s = float(np.median(step))
+    unit = next((name for name, scale in _FINER.items() if _LEAST_STEP_S <= usual_s * scale <= _MOST_STEP_S), None)
+    if usual_s > _MOST_STEP_S and unit:
+        raise ValueError(
+            f"time_s: want seconds, got steps of {usual_s:g}; they look like {unit}: name the column so, as time_ms"
+        )
     if step.max() > _LONGEST_PAUSE_S:
         at = int(step.argmax())
         raise ValueError(

@@ -20,6 +20,8 @@ class PathCosts:
         A transition costs ``seam + transition · weight / scale``.
     transition_scale : float, > 0, or None
         Weight of a poor seam. None: the 95th percentile of the graph's weights.
+    rough : float, >= 0
+        A transition costs ``rough · (log2 of the clips' own jerk around it over what is usual)²`` more.
     warp, leaving, warp_outside : float, >= 0
         A step of warp ratio r (song time ÷ clip time) costs ``warp · (ln r / ln 1.1)²``; outside the soft bounds
         ``leaving + warp_outside · e`` more, e = 0 at the soft bound and 1 at the hard one, linear in ln r and beyond.
@@ -49,6 +51,7 @@ class PathCosts:
     seam: float = 0.5
     transition: float = 1.0
     transition_scale: float | None = None
+    rough: float = 1.0
     warp: float = 0.1
     leaving: float = 8.0
     warp_outside: float = 8.0
@@ -147,6 +150,32 @@ def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:
     if scale is None:
         scale = float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0
     return np.asarray(costs.seam + costs.transition * graph.weight / (scale if scale > 0 else 1.0), np.float64)
+
+
+def rough_cost(graph: MotionGraph, costs: PathCosts) -> Float:
+    """Price of each transition by how rough its clips are around it, (E,) float64 (ours).
+
+    A seam draws the eye to what happens around it: a stamp or a kick of the one clip beside the calm of the other.
+
+    Parameters
+    ----------
+    graph : MotionGraph of E transitions
+    costs : PathCosts
+
+    Returns
+    -------
+    (E,) float64, >= 0
+        ``rough · log2(peak / usual)²``: the larger jerk around its two nodes over what is usual in the calmer of the
+        two clips, or in the median clip where both are wilder; 0 where it is below, or jerk is not known.
+    """
+    if graph.peak_jerk is None or graph.usual_jerk is None or not len(graph.source):
+        return np.zeros(len(graph.source))
+    peak = np.maximum(graph.peak_jerk[graph.source], graph.peak_jerk[graph.target])
+    usual = np.minimum(graph.usual_jerk[graph.source], graph.usual_jerk[graph.target])
+    usual = np.minimum(usual, np.median(graph.usual_jerk))
+    is_rough = (peak > usual) & (usual > 0)
+    doublings = np.log2(np.where(is_rough, peak, 1.0) / np.where(is_rough, usual, 1.0))
+    return np.asarray(costs.rough * doublings**2, np.float64)
 
 
 def jump_back_cost(graph: MotionGraph, costs: PathCosts) -> Float:

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.costs import PathCosts, is_within, usage_cost, warp_cost
+from kernels.graph.costs import PathCosts, is_within, rough_cost, usage_cost, warp_cost
 from kernels.graph.program import Move, Program
 from kernels.graph.repetition import spread
 from kernels.types import Choreography, Float, Int, MotionGraph
@@ -167,11 +167,9 @@ def find_path(
     start = _starts(graph, starts)
     if n_beats == 0:
         return _evaluate(None, [], costs, graph)
-    most = _most_expensive(graph, beat_s, costs, steps)
-    if stretch_price is not None and n_nodes:
-        most += n_beats * max(m for m, _ in steps) * float(stretch_price.max())
-    if interval_price is not None and interval_price.size:
-        most += n_beats * float(interval_price.max())
+    most = more_than_any(
+        graph, beat_s, costs=costs, steps=steps, stretch_price=stretch_price, interval_price=interval_price
+    )
     for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
         program = Program(
             graph,
@@ -225,13 +223,18 @@ def to_choreography(
     )
 
 
+def first_beats(graph: MotionGraph) -> Int:
+    """First beat of every clip, in order: nodes that no other leads to within its clip."""
+    return np.setdiff1d(np.arange(len(graph.clip_index)), graph.next_node)
+
+
 def _starts(graph: MotionGraph, starts: Literal["first", "any"] | Int) -> Int:
     n = len(graph.clip_index)
     if isinstance(starts, str):
         if starts == "any":
             return np.arange(n)
         if starts == "first":
-            return np.setdiff1d(np.arange(n), graph.next_node)
+            return first_beats(graph)
         raise ValueError(f"starts: want 'first', 'any' or nodes, got {starts!r}")
     nodes = np.unique(np.asarray(starts, np.int64))
     if len(nodes) and (nodes[0] < 0 or nodes[-1] >= n):
@@ -239,17 +242,40 @@ def _starts(graph: MotionGraph, starts: Literal["first", "any"] | Int) -> Int:
     return nodes
 
 
-def _most_expensive(graph: MotionGraph, beat_s: Float, costs: PathCosts, steps: tuple[tuple[int, int], ...]) -> float:
-    """More than any path can cost, repetition included: what a step outside the hard bounds is priced at."""
+def more_than_any(
+    graph: MotionGraph,
+    beat_s: Float,
+    *,
+    costs: PathCosts,
+    steps: tuple[tuple[int, int], ...] = STEPS,
+    stretch_price: Float | None = None,
+    interval_price: Float | None = None,
+) -> float:
+    """Price a step outside the hard bounds: more than any path can cost, repetition included.
+
+    Parameters
+    ----------
+    graph, beat_s, costs, steps, stretch_price, interval_price : as :func:`find_path` has them
+
+    Returns
+    -------
+    float, > 0
+    """
     n_beats = len(beat_s) - 1
     longest = max(m for m, _ in steps)
     warp = float(warp_cost(np.array(costs.last_resort_ratio), costs).max())
     stride = max(costs.stride * abs(float(np.log2(m / d))) for m, d in steps)
     largest = float(graph.weight.max(initial=0.0))
     scale = costs.transition_scale or (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
-    seam = costs.seam + costs.transition * largest / scale + costs.jump_back
+    roughest = float(rough_cost(graph, costs).max(initial=0.0))
+    seam = costs.seam + costs.transition * largest / scale + roughest + costs.jump_back
     missed = costs.missed_beat * max(d for _, d in steps)
-    return 1.0 + n_beats * (warp + stride + seam + missed + longest * costs.usage * n_beats * longest)
+    most = 1.0 + n_beats * (warp + stride + seam + missed + longest * costs.usage * n_beats * longest)
+    if stretch_price is not None and stretch_price.size:
+        most += n_beats * longest * float(stretch_price.max())
+    if interval_price is not None and interval_price.size:
+        most += n_beats * float(interval_price.max())
+    return most
 
 
 def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, graph: MotionGraph) -> Path:

@@ -21,7 +21,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.costs import PathCosts, beat_cost, is_within, jump_back_cost, stride_cost, transition_cost, warp_cost
+from kernels.graph.costs import (
+    PathCosts,
+    beat_cost,
+    is_within,
+    jump_back_cost,
+    rough_cost,
+    stride_cost,
+    transition_cost,
+    warp_cost,
+)
 from kernels.types import Float, Int, MotionGraph
 
 Mask = NDArray[np.bool_]
@@ -77,7 +86,8 @@ class Program:
         self._admissible, self._bounds, self._outside_price = admissible, bounds, outside_price
         order = np.lexsort((graph.target, graph.source))
         self._source, self._target = graph.source[order], graph.target[order]
-        self.seam, self.jump_back = transition_cost(graph, costs)[order], jump_back_cost(graph, costs)[order]
+        self.seam = (transition_cost(graph, costs) + rough_cost(graph, costs))[order]
+        self.jump_back = jump_back_cost(graph, costs)[order]
         self._edge_cost = self.seam + self.jump_back
         self._leaving, self._first_edge = np.unique(self._source, return_index=True)
         self._edge_of = np.searchsorted(self._source, np.arange(self.n_nodes + 1))
@@ -92,6 +102,11 @@ class Program:
         self._interval_price = interval_price
         self.price = np.zeros(self.n_nodes) if stretch_price is None else stretch_price
         self.missed = [beat_cost(graph, end, d, costs) for end, (_, d) in zip(self.end, steps, strict=True)]
+
+    @property
+    def transitions(self) -> tuple[Int, Int, Float]:
+        """Source, target and cost of every transition, sorted by source, then target; (E,) each."""
+        return self._source, self._target, self._edge_cost
 
     def step_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float | None:
         """Cost of a kind of step at a beat, one a node: warp, stride, missed beats; infinite where it cannot be danced.

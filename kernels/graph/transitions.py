@@ -266,15 +266,14 @@ def _join(nodes: BeatNodes, pairs: Nearest, asked: float, used: float) -> Transi
     n = max(len(nodes), 1)
     near = pairs.weight < used
     row, other = pairs.row[near], pairs.other[near]
-    source, target = np.concatenate([row, other]), np.concatenate([other, row])
-    _, first = np.unique(source * n + target, return_index=True)
-    source, target = source[first], target[first]
-    apart, weight = np.tile(pairs.distance[near], 2)[first], np.tile(pairs.weight[near], 2)[first]
+    _, first = np.unique(np.minimum(row, other) * n + np.maximum(row, other), return_index=True)
+    source, target = np.concatenate([row[first], other[first]]), np.concatenate([other[first], row[first]])
+    apart, weight = np.tile(pairs.distance[near][first], 2), np.tile(pairs.weight[near][first], 2)
     useful = nodes.may_leave()[source] & nodes.may_enter()[target] & (nodes.next_node[source] != target)
     roomy = nodes.may_leave(pairs.min_margin_s)[source] & nodes.may_enter(pairs.min_margin_s)[target]
     smooth = pairs.is_smooth[source] & pairs.is_smooth[target]
     edge = np.flatnonzero(useful & roomy & smooth)
-    edge = edge[np.lexsort((target[edge], weight[edge], source[edge]))]
+    edge = edge[_by_source(source[edge], weight[edge], target[edge])]
     graph = MotionGraph(nodes.clip_index, nodes.time_s, nodes.next_node, source[edge], target[edge], weight[edge])
     return Transitions(
         graph=graph,
@@ -285,6 +284,18 @@ def _join(nodes: BeatNodes, pairs: Nearest, asked: float, used: float) -> Transi
         n_margin_removed=int((useful & ~roomy).sum()),
         n_jerk_removed=int((useful & roomy & ~smooth).sum()),
     )
+
+
+def _by_source(source: Int, weight: Float, target: Int) -> Int:
+    """Order by source, then weight, then target: one sort of whole numbers where no source has a weight twice."""
+    ascending = np.argsort(weight)
+    level = np.zeros(len(weight), np.int64)
+    level[ascending[1:]] = np.cumsum(np.diff(weight[ascending]) != 0)
+    key = source * max(len(weight), 1) + level
+    order = np.argsort(key)
+    if (np.diff(key[order]) == 0).any():
+        order = np.lexsort((target, weight, source))
+    return order
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,8 +350,8 @@ class _Search:
         ratio = distance / (self.local[row[r]] + self.local[column[c]])
         order = np.lexsort((c, ratio, r))
         r, c, distance, ratio = r[order], c[order], distance[order], ratio[order]
-        listed = _rank(r, np.ones(len(r), bool)) < self.n_nearest
-        listed |= (_rank(r, allowed[c]) < self.n_nearest) & allowed[c]
+        listed = rank_within(r, np.ones(len(r), bool)) < self.n_nearest
+        listed |= (rank_within(r, allowed[c]) < self.n_nearest) & allowed[c]
         return row[r[listed]], column[c[listed]], distance[listed], ratio[listed]
 
     def _crowd(
@@ -387,8 +398,19 @@ def _exclude(weight: NDArray[np.floating], excluded: Int) -> None:
         weight[r, c:d] = np.inf
 
 
-def _rank(group: Int, counted: Mask) -> Int:
-    """How many counted come before each entry in its group; groups are contiguous."""
+def rank_within(group: Int, counted: Mask) -> Int:
+    """Count what comes before each entry in its group.
+
+    Parameters
+    ----------
+    group : (P,) int64, ascending
+    counted : (P,) bool, what counts
+
+    Returns
+    -------
+    (P,) int64
+    """
     before: Int = np.cumsum(counted) - counted
-    start = np.searchsorted(group, group, "left")
+    is_first = np.append(True, group[1:] != group[:-1])[: len(group)]
+    start = np.maximum.accumulate(np.where(is_first, np.arange(len(group)), 0)) if len(group) else group
     return before - before[start]

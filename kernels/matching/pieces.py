@@ -15,6 +15,14 @@ from kernels.types import Float, Int
 SNAP_REACH_S = 0.12
 """A start is moved no further: more would be another match."""
 
+OTHER_APART_S = 0.4
+"""Starts of one clip nearer to each other than this are the same piece: a beat at 150 a minute."""
+
+OTHER_LEAST_RATIO = 0.8
+"""Starts of a clip that score less than this share of its best are not offered."""
+
+_COARSE = 3  # frames between the starts tried first: half a bump's standard deviation
+
 
 def motion_under(clip: NDArray[np.floating], n_frames: int, *, numerator: int, start: float) -> Float:
     """Read a clip's feature as a match does: b[f] = m(s f + f0), linearly interpolated.
@@ -113,6 +121,61 @@ def ease_pace(
     if found[best] >= (1.0 - loss_ratio) * score(numerator, start_frame_index):
         return nearer, starts[best]
     return numerator, start_frame_index
+
+
+def other_starts(
+    segment: NDArray[np.floating],
+    clip: NDArray[np.floating],
+    *,
+    numerator: int,
+    start_frame_index: int,
+    most: int,
+) -> Int:
+    """Find where else in its clip a match scores nearly as well, at its scale.
+
+    A search keeps the best start of a clip. Motion that comes back, as steps do, matches about as well a few beats on,
+    with other poses at its ends: that is what lets pieces connect.
+
+    Parameters
+    ----------
+    segment : (L,) float, L >= 1, finite, >= 0
+    clip : (T,) float, finite, >= 0
+    numerator : int, the scale times 50
+    start_frame_index : int, f0 of the match
+    most : int, >= 0
+
+    Returns
+    -------
+    (n,) int64, at most ``most``, the best first
+        Peaks of the score, at least 0.4 s from the match and from each other, that reach 0.8 of its score. Looked for
+        at every third frame and then near those, so that one of a lone impulse may be missed. None for silence.
+    """
+    scale = numerator / SCALE_DENOMINATOR
+    n_starts = max(int(np.floor(len(clip) - 1 - scale * (len(segment) - 1) + 1e-9)) + 1, 0)
+    sounding = np.flatnonzero(segment > 0)
+    none = np.zeros(0, np.int64)
+    if n_starts == 0 or not len(sounding) or most == 0:
+        return none
+    music, motion, at = np.asarray(segment, np.float64)[sounding], np.asarray(clip, np.float64), scale * sounding
+
+    def score(starts: Int) -> Float:
+        under = np.interp(starts[:, None] + at, np.arange(len(motion)), motion)
+        return np.asarray(similarity(music, under).sum(axis=1), np.float64)
+
+    least = OTHER_LEAST_RATIO * float(score(np.array([start_frame_index]))[0])
+    coarse = np.arange(0, n_starts, _COARSE)
+    found = score(coarse)
+    around = np.concatenate([[-np.inf], found, [-np.inf]])
+    peaks = np.flatnonzero((found > around[:-2]) & (found >= around[2:]) & (found > 0.9 * least))
+    kept: list[int] = []
+    for peak in peaks[np.argsort(-found[peaks], kind="stable")]:
+        near = np.arange(max(coarse[peak] - _COARSE + 1, 0), min(coarse[peak] + _COARSE, n_starts))
+        exact = score(near)
+        start = int(near[np.argmax(exact)])
+        is_apart = all(abs(start - k) >= OTHER_APART_S * FEATURE_RATE_HZ for k in (start_frame_index, *kept))
+        if len(kept) < most and is_apart and exact.max() >= max(least, 1e-12):
+            kept.append(start)
+    return np.array(kept, np.int64) if kept else none
 
 
 def split_span(start_s: float, end_s: float, *, beat_s: Float, longest_s: float) -> Float:

@@ -60,8 +60,7 @@ BRUTE_SPARSE = Plan(is_sparse=True)
 PLANS = (
     Plan((25, 8), (10, 8), (10, 5)),
     Plan((25, 8), (10, 4), (5,)),
-    Plan((10, 8), (10, 4), (5,)),
-    Plan((10, 8), (5, 2), (5,)),
+    Plan((25, 8), (5, 2), (5,)),
     Plan((10, 8), (5, 4), is_sparse=True),
     Plan((1, 8), (1, 4), is_sparse=True),
     BRUTE_SPARSE,

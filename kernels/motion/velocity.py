@@ -164,3 +164,45 @@ def jerk(position_m: Float, frame_rate_hz: float) -> Float:
         third = np.linalg.norm(np.diff(position_m, n=3, axis=0), axis=-1).max(axis=-1)
         result[1:-2] = third * frame_rate_hz**3
     return result
+
+
+SEEN_STEP_S = 1.0 / 30.0
+"""Time of one difference where jerk is taken as a viewer sees it, whatever rate a clip was recorded at."""
+
+
+def jerk_around(
+    position_m: Float, frame_rate_hz: float, *, time_s: Float, reach_s: float = 0.33
+) -> tuple[Float, float]:
+    """Find how rough a clip is around given moments, and usually (ours).
+
+    Parameters
+    ----------
+    position_m : (F, J, 3) float, metres, world
+    frame_rate_hz : float, > 0
+    time_s : (B,) float, seconds from the first frame
+    reach_s : float, seconds
+        Looked at on either side: half a blend and a tenth of a second of song, danced a tenth faster.
+
+    Returns
+    -------
+    peak_m_per_s3 : (B,) float64, metres per second cubed
+        Largest jerk of any joint within reach, by differences over about 1/30 s; zeros for a clip of fewer than four.
+    usual_m_per_s3 : float
+        99th percentile over the clip; 0 for a clip too short.
+
+    Raises
+    ------
+    ValueError
+        As :func:`mean_speed`.
+    """
+    check_position(position_m, frame_rate_hz)
+    stride = max(round(SEEN_STEP_S * frame_rate_hz), 1)
+    n = len(position_m) - 3 * stride
+    if n < 1:
+        return np.zeros(len(time_s)), 0.0
+    a, b, c, d = (position_m[k * stride : k * stride + n] for k in range(4))
+    found = np.linalg.norm(d - 3 * c + 3 * b - a, axis=-1).max(axis=-1) * (frame_rate_hz / stride) ** 3
+    middle = (np.arange(n) + 1.5 * stride) / frame_rate_hz
+    first, last = np.searchsorted(middle, time_s - reach_s), np.searchsorted(middle, time_s + reach_s, side="right")
+    peak = np.array([found[a:b].max(initial=0.0) for a, b in zip(first, last, strict=True)]).reshape(-1)
+    return peak, float(np.percentile(found, 99))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kernels.opencl.match_stages import Emitted, Stages
 
 _PROBED = 64
+_FEW = 0.5  # share of pairs that are refined in one turn, once there is a score to beat
 _MOST = 2**20
 
 
@@ -75,15 +76,20 @@ def _refined(
     segment, clip = probed.T
     known[segment, clip] = stages.probe(probed, place[segment, clip])
     done = np.zeros(bound.shape, bool)
-    for wave in (_highest(bound, k + 4), np.ones(bound.shape, bool)):
+    n_first = k + 4
+    while not done.all():
         least = np.maximum(_kth(known, k), floor)
-        chosen = wave & ~done & (bound >= 0) & (bound + slack >= least[:, None])
+        wanted = ~done & (bound >= 0) & (bound + slack >= least[:, None])
+        # where bounds tell little, a better score to beat is worth one more turn
+        is_last = n_first >= n_clips or (done.any() and wanted.sum() < _FEW * bound.size)
+        chosen = wanted if is_last else wanted & _highest(bound, n_first)
         pairs = _pairs(chosen)
         segment, clip = pairs.T
         found = stages.best(pairs, np.maximum(least[segment], known[segment, clip]))
         known[segment, clip] = np.maximum(known[segment, clip], found)
         done |= chosen
-        if k + 4 >= n_clips:
+        n_first *= 4
+        if is_last:
             break
     return known
 

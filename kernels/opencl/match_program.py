@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kernels.opencl.device import full_name
 
+RUN = 4  # pairs of one clip that one work-item refines together, depth first
 _LARGE_BYTES = 2**22
 _INDEX = ("match_index.cl",)
 _SEARCH = ("match_score.cl", "match_refine.cl")
@@ -48,7 +49,7 @@ class Program:
         self.lanes = lanes or max(width for width in (4, 8, 16) if width <= most)
         self.together = together or (12 if self.is_cpu else 4)
         self.queue = cl.CommandQueue(context)
-        self._built: dict[tuple[str, bool], cl.Program] = {}
+        self._built: dict[tuple[str, int, bool], cl.Program] = {}
 
     @property
     def name(self) -> str:
@@ -120,12 +121,14 @@ class Program:
 
     def _program(self, name: str, is_safe: bool) -> cl.Program:
         files = _INDEX if name in ("sum_frames", "sum_blocks", "largest_of") else _SEARCH
-        key = (files[0], is_safe and files is _SEARCH)
+        # groups are few, and narrow vectors waste less at a clip's end
+        lanes = max(self.lanes // 2, 4) if name == "bound_together" else self.lanes
+        key = (files[0], lanes, is_safe and files is _SEARCH)
         if key not in self._built:
             folder = resources.files("kernels.opencl")
             source = "\n".join(folder.joinpath(file).read_text(encoding="utf-8") for file in files)
-            options = ["-cl-mad-enable", "-D", f"LANES={self.lanes}", "-D", f"WIDTH={self.together}"]
+            options = ["-cl-mad-enable", "-D", f"LANES={lanes}", "-D", f"WIDTH={self.together}", "-D", f"RUN={RUN}"]
             with warnings.catch_warnings():  # some compilers talk of vector widths while all is well
                 warnings.simplefilter("ignore", cl.CompilerWarning)
-                self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[1] else []))
+                self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[2] else []))
         return self._built[key]

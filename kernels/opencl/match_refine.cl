@@ -173,105 +173,192 @@ __kernel void probe(
     out[id] = score > 0.0f ? score : 0.0f;
 }
 
-// Depth first. least_score[pair]: what a start must reach. With most = 0, the best score found (-1: none) goes to
-// found[pair] and prunes on; else every start with score + margin >= least_score is written, `most` at most, and counted.
-// Groups that pass the first bound wait in a list, so that what follows takes up to four of them together.
+// Depth first. A *run* is up to RUN pairs of one clip: run[r] is the first of run r, their first bound is of one
+// table, so they take it together where all blocks count (`dense`, (n_segments, n_blocks)); else a run is one pair, by its
+// list. least_score[pair]: what a start must reach. With most = 0, the best score found (-1: none) goes to found[pair] and
+// prunes on; else every start with score + margin >= least_score is written, `most` at most, and counted.
+// Groups that pass the first bound wait, as spans of 8 starts, so that what follows takes up to four of them together.
 #define WAITING 64
+
+// what one pair of a run has waiting
+typedef struct {
+    int n;
+    int from[WAITING];
+    float wanted, best;
+} Pair;
+
+static void go_on(
+    Pair *its, const int p, const int id, const int most, CLIPS, SEGMENTS, STEPS, TABLES,
+    __global const int2 *restrict pair, __global int *restrict count, __global int2 *restrict emitted)
+{
+    const int segment = pair[id].x, clip = pair[id].y, stride = clip_stride[clip];
+    const size_t base = clip_first[clip];
+    const int n_starts = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]);
+    const float a_sum = music_sum[segment], slack = margin[segment];
+    int *from = its->from, n = its->n;
+    float wanted = its->wanted;
+    float8 sum[4];
+    for (int level = 1; level < n_bounds; ++level) {
+        __global const float *rows = level == 1 ? table_1 + base * rows_1 : table_2 + base * rows_2;
+        int passed = 0;
+        for (int g = 0; g < n;) {
+            const int left = n - g, taken = left > 2 ? 4 : left;
+            if (left == 3)
+                from[n] = from[g];
+            if (taken == 4)
+                sums_of_4(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
+            else if (taken == 2)
+                sums_of_2(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
+            else
+                sums_of_1(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
+            for (int j = 0; j < taken && j < left; ++j) {
+                const int f0 = from[g + j];
+                from[passed] = f0;
+                passed += a_sum + slack - least_of_8(sum[j], n_starts - f0) >= wanted;
+            }
+            g += taken;
+        }
+        n = passed;
+    }
+    for (int g = 0; g < n;) {
+        const int left = n - g, taken = left > 2 ? 4 : left;
+        __global const float *in = frame + base;
+        __global const float *weights = weight + p * level_long[n_bounds];
+        if (left == 3)
+            from[n] = from[g];
+        if (taken == 4)
+            exact_of_4(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
+        else if (taken == 2)
+            exact_of_2(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
+        else
+            exact_of_1(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
+        for (int j = 0; j < taken && j < left; ++j) {
+            const int f0 = from[g + j], starts = SMALLER(n_starts - f0, 8);
+            float top = a_sum - least_of_8(sum[j], starts);
+            top = top > 0.0f ? top : 0.0f;
+            if (most == 0) {
+                its->best = top > its->best ? top : its->best;
+                wanted = top > wanted ? top : wanted;
+            } else if (top + slack >= wanted) {
+                union { float8 v; float lane[8]; } exact;
+                exact.v = sum[j];
+                for (int start = 0; start < starts; ++start)
+                    if (a_sum - exact.lane[start] + slack >= wanted || slack >= wanted) {
+                        const int at = atomic_inc(count);
+                        if (at < most)
+                            emitted[at] = (int2)(id, (p << SCALE_BITS) + f0 + start);
+                    }
+            }
+        }
+        g += taken;
+    }
+    its->wanted = wanted;
+    its->n = 0;
+}
+
+static float least_of(const VEC v)
+{
+#if LANES == 16
+    const float8 eight = v.lo < v.hi ? v.lo : v.hi;
+    const float4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
+#elif LANES == 8
+    const float4 four = v.lo < v.hi ? v.lo : v.hi;
+#else
+    const float4 four = v;
+#endif
+    const float2 two = four.lo < four.hi ? four.lo : four.hi;
+    return SMALLER(two.x, two.y);
+}
+
+// the first bounds of LANES groups for RUN segments
+static void bounds_together(
+    __global const float *rows, const int columns, __global const int2 *steps, const int n_blocks,
+    __global const float *const *dense, VEC *out)
+{
+    VEC sum[RUN];
+    #pragma unroll
+    for (int s = 0; s < RUN; ++s)
+        sum[s] = (VEC)(0.0f);
+    for (int k = 0; k < n_blocks; k += 4) {
+        const int2 k0 = steps[k], k1 = steps[k + 1], k2 = steps[k + 2], k3 = steps[k + 3];
+        // a block past the end of a shorter segment may lie outside the clip: read anything, it adds nothing
+        const VEC b0 = LOAD(rows + (size_t)k0.x * columns + SMALLER(k0.y, columns));
+        const VEC b1 = LOAD(rows + (size_t)k1.x * columns + SMALLER(k1.y, columns));
+        const VEC b2 = LOAD(rows + (size_t)k2.x * columns + SMALLER(k2.y, columns));
+        const VEC b3 = LOAD(rows + (size_t)k3.x * columns + SMALLER(k3.y, columns));
+        #pragma unroll
+        for (int s = 0; s < RUN; ++s) {
+            __global const float *a = dense[s] + 2 * k;
+            ADD_TERMS(sum[s], b0, b1, b2, b3, a[0], a[2], a[4], a[6], a[1], a[3], a[5], a[7]);
+        }
+    }
+    #pragma unroll
+    for (int s = 0; s < RUN; ++s)
+        out[s] = sum[s];
+}
+
 __kernel void refine(
-    const int n_pairs, const int most, CLIPS, SEGMENTS, STEPS, TABLES,
+    const int n_runs, const int most, CLIPS, SEGMENTS, STEPS, TABLES,
+    const int block_frames, const int n_blocks, __global const float *restrict dense, __global const int *restrict run,
     __global const int2 *restrict pair, __global const float *restrict least_score,
     __global float *restrict found, __global int *restrict count, __global int2 *restrict emitted)
 {
-    const int id = get_global_id(0);
-    if (id >= n_pairs)
+    const int r = get_global_id(0);
+    if (r >= n_runs)
         return;
-    const int segment = pair[id].x, clip = pair[id].y;
-    const size_t base = clip_first[clip];
-    const int stride = clip_stride[clip], columns = stride / fold;
-    const float a_sum = music_sum[segment], slack = margin[segment];
-    float wanted = least_score[id], best = -1.0f;
+    const int id = run[r], n = run[r + 1] - id, clip = pair[id].y, columns = clip_stride[clip] / fold;
+    __global const float *rows = folded + (size_t)clip_first[clip] * fold_rows;
+    Pair its[RUN];
+    __global const float *amounts[RUN];
+    int frames[RUN], shortest = segment_frames[pair[id].x], longest = shortest;
+    for (int s = 0; s < RUN; ++s) {
+        const int pair_id = id + SMALLER(s, n - 1), segment = pair[pair_id].x;
+        its[s].n = 0;
+        its[s].wanted = least_score[pair_id];
+        its[s].best = -1.0f;
+        amounts[s] = dense + (size_t)segment * n_blocks * 2;
+        frames[s] = segment_frames[segment];
+        shortest = SMALLER(frames[s], shortest);
+        longest = longest < frames[s] ? frames[s] : longest;
+    }
+    const int blocks = SMALLER(((longest + block_frames - 1) / block_frames + 3) / 4 * 4, n_blocks);
     for (int p = 0; p < n_scales; ++p) {
-        const int n_starts = count_starts(clip_frames[clip], segment_frames[segment], numerator[p]);
-        const int n_groups = (n_starts + fold - 1) / fold;
-        int from[WAITING];
-        int n = 0;
-        for (int i = 0; i < n_groups; i += 2 * LANES) {
-            union { VEC v[2]; float lane[2 * LANES]; } bound;
-            bound.v[0] = bound.v[1] = (VEC)(0.0f);
-            if (n_bounds > 0) {
-                __global const float *rows = folded + base * fold_rows + i;
-                if (n_groups - i > LANES)
-                    bounds_of_2(rows, columns, STEPS_OF(0, p), LIST_OF(0, segment), bound.v);
-                else
-                    bounds_of_1(rows, columns, STEPS_OF(0, p), LIST_OF(0, segment), bound.v);
-            }
-            const int here = n_groups - i < 2 * LANES ? n_groups - i : 2 * LANES;
-            for (int lane = 0; lane < here; ++lane) {
-                from[n] = fold * (i + lane);
-                n += a_sum - bound.lane[lane] + slack >= wanted;
-            }
-            if (n + 2 * LANES < WAITING && i + 2 * LANES < n_groups)
-                continue;
-            float8 sum[4];
-            for (int level = 1; level < n_bounds; ++level) {
-                __global const float *rows = level == 1 ? table_1 + base * rows_1 : table_2 + base * rows_2;
-                int passed = 0;
-                for (int g = 0; g < n;) {
-                    const int left = n - g, taken = left > 2 ? 4 : left;
-                    if (left == 3)
-                        from[n] = from[g];
-                    if (taken == 4)
-                        sums_of_4(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
-                    else if (taken == 2)
-                        sums_of_2(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
-                    else
-                        sums_of_1(rows, from + g, stride, STEPS_OF(level, p), LIST_OF(level, segment), sum);
-                    for (int j = 0; j < taken && j < left; ++j) {
-                        const int f0 = from[g + j];
-                        from[passed] = f0;
-                        passed += a_sum + slack - least_of_8(sum[j], min(n_starts - f0, fold)) >= wanted;
+        int n_groups[RUN];
+        for (int s = 0; s < n; ++s)
+            n_groups[s] = (count_starts(clip_frames[clip], frames[s], numerator[p]) + fold - 1) / fold;
+        const int n_most = (count_starts(clip_frames[clip], shortest, numerator[p]) + fold - 1) / fold;
+        for (int i = 0; i < n_most; i += LANES) {
+            union { VEC v[RUN]; float lane[RUN][LANES]; } bound;
+            if (n_bounds == 0)
+                bound.v[0] = (VEC)(0.0f);
+            else if (n > 1)
+                bounds_together(rows + i, columns, STEPS_OF(0, p), blocks, amounts, bound.v);
+            else
+                bounds_of_1(rows + i, columns, STEPS_OF(0, p), LIST_OF(0, pair[id].x), bound.v);
+            for (int s = 0; s < n; ++s) {
+                const int segment = pair[id + s].x, here = SMALLER(n_groups[s] - i, LANES);
+                const float limit = music_sum[segment] + margin[segment] - its[s].wanted;
+                if (least_of(bound.v[s]) <= limit) {
+                    int waiting = its[s].n, last = waiting > 0 ? its[s].from[waiting - 1] : -1;
+                    for (int lane = 0; lane < here; ++lane) {
+                        const int from = fold * (i + lane) & ~7;
+                        if (bound.lane[s][lane] <= limit && from != last) {
+                            its[s].from[waiting++] = from;
+                            last = from;
+                        }
                     }
-                    g += taken;
+                    its[s].n = waiting;
                 }
-                n = passed;
+                if (its[s].n > 0 && (its[s].n + LANES >= WAITING || i + LANES >= n_groups[s]))
+                    go_on(its + s, p, id + s, most, clip_first, clip_stride, clip_frames, frame, n_segments, music_sum, margin,
+                        segment_frames, first, block, amount, n_scales, numerator, step, weight, level_step, level_long,
+                        n_bounds, fold, fold_rows, folded, rows_1, table_1, rows_2, table_2, pair, count, emitted);
             }
-            for (int g = 0; g < n;) {
-                const int left = n - g, taken = left > 2 ? 4 : left;
-                __global const float *in = frame + base;
-                __global const float *weights = weight + p * level_long[n_bounds];
-                if (left == 3)
-                    from[n] = from[g];
-                if (taken == 4)
-                    exact_of_4(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
-                else if (taken == 2)
-                    exact_of_2(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
-                else
-                    exact_of_1(in, from + g, STEPS_OF(n_bounds, p), weights, LIST_OF(n_bounds, segment), sum);
-                for (int j = 0; j < taken && j < left; ++j) {
-                    const int f0 = from[g + j], starts = min(n_starts - f0, fold);
-                    float top = a_sum - least_of_8(sum[j], starts);
-                    top = top > 0.0f ? top : 0.0f;
-                    if (most == 0) {
-                        best = top > best ? top : best;
-                        wanted = top > wanted ? top : wanted;
-                    } else if (top + slack >= wanted) {
-                        union { float8 v; float lane[8]; } exact;
-                        exact.v = sum[j];
-                        for (int start = 0; start < starts; ++start)
-                            if (a_sum - exact.lane[start] + slack >= wanted || slack >= wanted) {
-                                const int at = atomic_inc(count);
-                                if (at < most)
-                                    emitted[at] = (int2)(id, (p << SCALE_BITS) + f0 + start);
-                            }
-                    }
-                }
-                g += taken;
-            }
-            n = 0;
         }
     }
     if (most == 0)
-        found[id] = best;
+        for (int s = 0; s < n; ++s)
+            found[id + s] = its[s].best;
 }
 
 // Level by level, first: the groups of each pair that reach least_score by the first bound. Written as (pair, place of the

@@ -18,6 +18,8 @@ typedef struct __attribute__((packed, aligned(4))) { float8 v; } Anywhere8;
 #define LOAD8(pointer) (((__global const Anywhere8 *)(pointer))->v)
 #define SCALE_BITS 24
 #define FAR 3.0e38f
+// some drivers call min out of line, which costs every vector register
+#define SMALLER(a, b) ((a) < (b) ? (a) : (b))
 
 #ifdef SAFE
 #define ADD_TERMS(sum, b0, b1, b2, b3, a0, a1, a2, a3, s0, s1, s2, s3) \
@@ -90,10 +92,10 @@ __kernel void bound_together(
             for (int k = 0; k < n_blocks; k += 4) {
                 const int2 k0 = steps[k], k1 = steps[k + 1], k2 = steps[k + 2], k3 = steps[k + 3];
                 // a block past the end of a shorter segment may lie outside the clip: read anything, it adds nothing
-                const VEC b0 = LOAD(rows + (size_t)k0.x * columns + min(k0.y, columns) + i);
-                const VEC b1 = LOAD(rows + (size_t)k1.x * columns + min(k1.y, columns) + i);
-                const VEC b2 = LOAD(rows + (size_t)k2.x * columns + min(k2.y, columns) + i);
-                const VEC b3 = LOAD(rows + (size_t)k3.x * columns + min(k3.y, columns) + i);
+                const VEC b0 = LOAD(rows + (size_t)k0.x * columns + SMALLER(k0.y, columns) + i);
+                const VEC b1 = LOAD(rows + (size_t)k1.x * columns + SMALLER(k1.y, columns) + i);
+                const VEC b2 = LOAD(rows + (size_t)k2.x * columns + SMALLER(k2.y, columns) + i);
+                const VEC b3 = LOAD(rows + (size_t)k3.x * columns + SMALLER(k3.y, columns) + i);
                 __global const float *ak = a + k * 2 * WIDTH;
                 #pragma unroll
                 for (int s = 0; s < WIDTH; ++s)
@@ -181,7 +183,7 @@ __kernel void score_together(
                 VEC b[4];
                 #pragma unroll
                 for (int j = 0; j < 4; ++j) {
-                    __global const float *at_frame = in + min(steps[k + j], stride) + i;
+                    __global const float *at_frame = in + SMALLER(steps[k + j], stride) + i;
                     const float w = weights[k + j];
                     b[j] = (1.0f - w) * LOAD(at_frame) + w * LOAD(at_frame + 1);
                 }

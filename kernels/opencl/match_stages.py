@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from kernels.matching.blocks import GROUP, Lists, block_sums, bundles, lists, margin, rows
 from kernels.matching.plan import Plan
 from kernels.matching.score import SCALE_DENOMINATOR
+from kernels.opencl.match_program import RUN
 from kernels.opencl.match_tables import Tables
 
 SCALE_BITS = 24
@@ -81,6 +82,9 @@ class Stages:
         levels = [lists(sums, smallest=quiet) for sums in self._sums]
         self._first, self._block, self._amount = self._lay_lists(levels)
         self._pair_lists = self._lay_lists([lists(self._pair_sums, smallest=quiet)])
+        # the first bounds of all blocks, for segments taken together
+        dense, n_blocks = bundles(self._sums[0], smallest=quiet, width=1)
+        self._dense = (bounds[0] if bounds else 1, n_blocks, program.buffer(dense))
         self._lay_steps(bounds)
         self._music_sum = program.buffer(music_sum.astype(np.float32))
         self._margin = program.buffer(self.margin)
@@ -219,12 +223,13 @@ class Stages:
         emitted: cl.Buffer,
     ) -> None:
         """Depth first over all pairs."""
-        there = (self.program.buffer(pairs), self.program.buffer(least))
+        run = runs(pairs[:, 1], longest=1 if self.plan.is_sparse or not self._n_bounds else RUN)
+        there = [self.program.buffer(array) for array in (run, pairs, least)]
+        common = (*self._clips(), *self._segments(), *self._steps(), *self._tables())
         self.program.run(
             "refine",
-            (len(pairs),),
-            *(len(pairs), most),
-            *(*self._clips(), *self._segments(), *self._steps(), *self._tables(), *there, found, count, emitted),
+            (len(run) - 1,),
+            *(len(run) - 1, most, *common, *self._dense, *there, found, count, emitted),
             is_safe=self.is_safe,
         )
         self.program.queue.finish()
@@ -363,6 +368,25 @@ class Stages:
         finer = [(len(rows(g, tables.numerators)), tables.dense(g)) for g in plan.then]
         finer += [unused] * (2 - len(finer))
         return (self._n_bounds, self._fold, *first, *finer[0], *finer[1])
+
+
+def runs(clip: NDArray[np.integer], *, longest: int) -> NDArray[np.int32]:
+    """Cut a list of pairs where their clip changes, and where a run is long enough.
+
+    Parameters
+    ----------
+    clip : (N,) int, the clip of each pair
+    longest : int, >= 1
+
+    Returns
+    -------
+    (runs + 1,) int32
+        The first pair of each run, and N.
+    """
+    index = np.arange(len(clip))
+    changes = np.append(True, clip[1:] != clip[:-1])[: len(clip)]
+    since = index - np.maximum.accumulate(np.where(changes, index, 0)) if len(clip) else index
+    return np.append(np.flatnonzero(since % longest == 0), len(clip)).astype(np.int32)
 
 
 def _folded(steps: NDArray[np.int32], fold: int) -> NDArray[np.int32]:

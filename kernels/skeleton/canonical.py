@@ -45,6 +45,14 @@ REQUIRED_JOINTS: tuple[str, ...] = tuple(
     ]
 )
 
+MIRRORED_JOINT: tuple[int, ...] = tuple(
+    JOINTS.index({"left": "right", "righ": "left"}[j[:4]] + j[4 if j.startswith("left") else 5 :])
+    if j.startswith(("left", "right"))
+    else k
+    for k, j in enumerate(JOINTS)
+)
+"""Index of the joint on the other side; of those in the middle, their own."""
+
 CANONICAL = Skeleton(
     joints=JOINTS,
     parent=np.array([-1 if parent is None else JOINTS.index(parent) for _, parent, _ in _REST]),
@@ -67,11 +75,5 @@ def mirror(root_xyz_m: Float, rotation_wxyz: Float) -> tuple[Float, Float]:
     -------
     The same two arrays, reflected.
     """
-    swap = [
-        JOINTS.index({"left": "right", "righ": "left"}[j[:4]] + j[4 if j.startswith("left") else 5 :])
-        if j.startswith(("left", "right"))
-        else k
-        for k, j in enumerate(JOINTS)
-    ]
     flip = np.array([1.0, 1.0, -1.0, -1.0])
-    return root_xyz_m * np.array([-1.0, 1.0, 1.0]), rotation_wxyz[:, swap] * flip
+    return root_xyz_m * np.array([-1.0, 1.0, 1.0]), rotation_wxyz[:, MIRRORED_JOINT] * flip

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels import rotation
-from kernels.assembly.blend import ease
+from kernels.assembly.joins import ease
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.inverse import two_bone

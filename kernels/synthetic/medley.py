@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from kernels import rotation
-from kernels.assembly.blend import ease
+from kernels.assembly.joins import ease
 from kernels.calibration.records import PARENT, SENSORS
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kernels.assembly.blend import ease
+from kernels.assembly.joins import ease
 from kernels.music.notes import DRUM_CHANNEL_NUMBER, Notes, sorted_notes
 from kernels.synthetic.dancer import Figure, pose
 from kernels.synthetic.medley import sway

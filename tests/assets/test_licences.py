@@ -2,7 +2,7 @@
 
 import pytest
 
-from assets.licences import Terms, is_allowed, terms_of, together
+from assets.licences import Terms, free_to_join, is_allowed, may_be_joined, report, terms_of, together
 
 
 @pytest.mark.parametrize(
@@ -19,6 +19,13 @@ from assets.licences import Terms, is_allowed, terms_of, together
         ("studio", ["internal"]),
         ("", ["internal"]),
         ("Ask Bob", ["internal", "attribution"]),
+        ("GPL-3.0-or-later", ["share alike", "attribution"]),
+        ("MIT AND CC-BY-NC-4.0", ["non commercial", "attribution"]),
+        ("CC-BY-NC-ND-4.0 OR CC-BY-4.0", ["attribution"]),
+        ("(MIT OR studio) AND CC-BY-SA-4.0", ["share alike", "attribution"]),
+        ("GPL-2.0-only WITH Classpath-exception-2.0", ["share alike", "attribution"]),
+        ("MIT AND", ["internal"]),
+        ("MIT AND (CC0-1.0", ["internal", "attribution"]),
     ],
 )
 def test_terms(licence, words):
@@ -41,3 +48,31 @@ def test_allowed():
     assert not is_allowed("CC-BY-NC-4.0", ["CC-BY-4.0"])
     assert not is_allowed("", ["CC0-1.0"])
     assert is_allowed("", ["studio"])
+
+
+def test_joining_is_changing():
+    assert may_be_joined("CC-BY-NC-4.0")
+    assert may_be_joined("")
+    assert not may_be_joined("CC-BY-ND-4.0")
+    assert not may_be_joined("MIT AND CC-BY-ND-4.0")
+    assert may_be_joined("MIT OR CC-BY-ND-4.0")
+
+
+def test_a_report_names_what_rules_and_what_nobody_knows():
+    free = report({"a": "CC0-1.0", "b": "MIT"})
+    assert (free["name"], free["terms"], free["unknown"], free["sentence"]) == ("CC0-1.0", [], [], "free to use")
+    told = report({"a": "CC-BY-NC-4.0", "b": "", "c": "Ask Bob", "d": "studio"})
+    assert told["name"] == "Ask Bob"
+    assert told["unknown"] == ["b", "c"]
+    assert told["clips"] == {"CC-BY-NC-4.0": ["a"], "unknown": ["b"], "Ask Bob": ["c"], "studio": ["d"]}
+    assert told["sentence"].startswith("not to leave the studio; not for sale")
+    assert "2 of 4 clips have no licence that is known and count as the studio's own" in told["sentence"]
+    assert "own terms" in report({"a": "CC-BY-SA-4.0", "b": "CC-BY-NC-4.0"})["sentence"]
+    assert "own terms" not in report({"a": "CC-BY-SA-4.0", "b": "CC-BY-4.0"})["sentence"]
+
+
+def test_pieces_are_made_of_what_may_be_changed():
+    licence_of = {"a": "CC-BY-4.0", "b": "CC-BY-ND-4.0", "c": ""}
+    assert free_to_join(licence_of, ()) == {"a", "c"}
+    assert free_to_join(licence_of, ["CC-BY-4.0", "CC-BY-ND-4.0"]) == {"a"}
+    assert free_to_join({}, ()) == set()

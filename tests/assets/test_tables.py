@@ -13,6 +13,7 @@ from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget
 from kernels.synthetic.dancer import place, take
 from kernels.types import BeatGrid, Choreography, Clip, MotionGraph
+from schemas.keys import mirrored
 from schemas.motion import CANONICAL_POSE, POSE, SKELETON
 from schemas.music import MUSIC_BEAT
 
@@ -129,6 +130,33 @@ def test_graph_comes_back_pruned_and_renumbered():
     assert list(zip(back.source.tolist(), back.target.tolist(), strict=True)) == [(1, 3), (3, 1)]
     np.testing.assert_allclose(back.accent, graph.accent[kept], atol=1e-7)
     assert edge["target_clip_id"].to_pylist() == ["s-b", "s-b", "s-a"]
+
+
+def test_mirrored_clips_are_a_clip_and_a_flag_in_tables_and_a_name_of_their_own_in_a_dance():
+    image = mirrored("s-a")
+    graph = MotionGraph(
+        clip_index=np.array([0, 0, 1, 1]),
+        time_s=np.array([0.2, 0.7, 0.2, 0.7]),
+        next_node=np.array([1, -1, 3, -1]),
+        source=np.array([1]),
+        target=np.array([2]),
+        weight=np.array([0.1]),
+    )
+    labels, index, kept = ["x", "x"], np.array([0, 1, 0, 1]), np.ones(4, bool)
+    node = tables.from_motion_graph_node(graph, ["s-a", image], index, labels, kept)
+    edge = tables.from_motion_graph_edge(graph, ["s-a", image], np.array([1.0]))
+    assert node["clip_id"].to_pylist() == ["s-a"] * 4
+    assert node["is_mirrored"].to_pylist() == [False, False, True, True]
+    assert edge["target_clip_id"].to_pylist() == ["s-a"]
+    back, clips = tables.to_motion_graph(node, edge)
+    assert clips == ("s-a", image)
+    assert back.clip_index.tolist() == [0, 0, 1, 1]
+    two = np.array([0.0, 0.5])
+    steps = Choreography(("s-a", image), two, two + 0.5, two, two + 0.5, np.array([False, True]), np.array([0, 0.25]))
+    rows = tables.from_choreography("song", "graph", steps, {})
+    assert rows["clip_id"].to_pylist() == ["s-a", "s-a"]
+    assert rows["is_mirrored"].to_pylist() == [False, True]
+    assert tables.to_choreography(rows).clip_id == steps.clip_id
 
 
 def test_graph_of_nothing():

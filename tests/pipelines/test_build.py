@@ -82,6 +82,27 @@ def test_changed_motion_reaches_the_catalogue(studio, build):
     assert (found["computed_clips"], found["carried_clips"]) == (2, 1)
 
 
+def test_the_graph_computes_the_row_and_column_of_a_changed_clip_and_equals_a_full_rebuild(studio, build):
+    clips = studio / "clips" / "ayame"
+    shutil.copy(clips / "wave.bvh", clips / "step.bvh")
+    build(studio)
+    found = metadata(studio, "motion_graph_node", "")
+    nodes = pq.read_table(studio / "lake" / "motion_graph_node" / "all.parquet")
+    rows = nodes["clip_id"].to_pylist().count("ayame-step")
+    assert found["computed_clips"] == 1
+    assert found["computed_rows"] == rows
+    assert found["rows_searched_again"] == 0
+    assert found["computed_distances"] == 2 * rows * nodes.num_rows
+    tables = [studio / "lake" / f"motion_graph_{what}" / "all.parquet" for what in ("node", "edge")]
+    updated = [path.read_bytes() for path in tables]
+    (studio / "lake" / "motion_graph.npz").write_bytes(b"damaged")
+    for path in tables:
+        path.unlink()
+    build(studio)
+    assert metadata(studio, "motion_graph_node", "")["computed_rows"] == nodes.num_rows
+    assert [path.read_bytes() for path in tables] == updated
+
+
 def test_touching_without_changing_runs_nothing(studio, build):
     for clip in studio.rglob("*.bvh"):
         os.utime(clip)

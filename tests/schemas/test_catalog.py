@@ -33,7 +33,8 @@ def test_promised_columns_are_there(name):
 
 @pytest.mark.parametrize("name", TABLES)
 def test_every_table_tells_whose_it_is(name):
-    assert {"clip_id", "song_id"} & set(TABLES[name].arrow.names)
+    if name != "motion_encoder":  # it is of the whole catalogue
+        assert {"clip_id", "song_id"} & set(TABLES[name].arrow.names)
     assert TABLES[name].name == name
     assert set(TABLES[name].key) <= set(TABLES[name].arrow.names)
 

@@ -8,12 +8,15 @@ from schemas.keys import (
     check_key,
     clip_key,
     is_key,
+    is_mirrored,
+    mirrored,
     part_key,
     part_of,
     parts_in_use,
     session_key,
     slug,
     song_key,
+    source_clip,
 )
 
 NAMES = [
@@ -82,3 +85,11 @@ def test_parts_stay_put_and_are_read_back():
     assert keys[3] == "big-part_03_of_16"
     assert all(is_key(k) for k in keys)
     assert parts_in_use([*keys, "small"]) == {"big": 16}
+
+
+def test_an_image_has_a_name_of_its_own_that_is_no_key_and_tells_its_clip():
+    image = mirrored("ayame-step")
+    assert is_mirrored(image)
+    assert not is_mirrored("ayame-step")
+    assert source_clip(image) == source_clip("ayame-step") == "ayame-step"
+    assert not is_key(image)

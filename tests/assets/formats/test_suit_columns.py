@@ -127,3 +127,18 @@ def test_more_rows_than_any_take_has(stored, monkeypatch):
     monkeypatch.setattr(suit_columns, "MAX_ROWS", 1)
     with pytest.raises(FormatError, match="want at most 1 rows, got 2"):
         read(stored)
+
+
+@pytest.mark.parametrize(
+    ("data", "what"),
+    [
+        (b"\x1f\x8b\x08" + bytes(40), "packed by gzip"),
+        (b"PK\x03\x04" + bytes(40), "spreadsheet"),
+        (b"\x02P6" + bytes(40), "C3D"),
+        (b"frame\0\0\0\1", "binary data"),
+        (b"# name: ulna\n# type: matrix\n", "'# name: ulna'"),
+    ],
+)
+def test_what_is_no_table_is_called_by_its_name(data, what):
+    with pytest.raises(FormatError, match=what):
+        parse_csv(data)

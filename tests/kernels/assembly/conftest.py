@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from kernels.assembly.blend import assemble
+from kernels.skeleton.canonical import CANONICAL
 from kernels.synthetic.dancer import take
 from kernels.types import Choreography
 
@@ -40,5 +42,16 @@ def phrases():
             seam,
             np.where(seam, blend_s, 0.0),
         )
+
+    return make
+
+
+@pytest.fixture
+def dance(clips):
+    """Assemble at 60 frames a second."""
+
+    def make(steps):
+        duration_s = float(steps.song_end_s[-1])
+        return assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=duration_s)
 
     return make

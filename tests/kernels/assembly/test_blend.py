@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.assembly.blend import assemble, ease, sample, turn
+from kernels.assembly.blend import assemble, sample, turn
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Clip
@@ -145,11 +145,6 @@ def test_turning_a_motion_turns_its_world(clips):
     turned, _ = kinematics.forward(CANONICAL, root, q)
     source, _ = kinematics.place(clip)
     np.testing.assert_allclose(turned, rotation.apply(rotation.from_heading(0.7), source), atol=1e-12)
-
-
-def test_ease_rises_without_slope_at_its_ends():
-    np.testing.assert_allclose(ease(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])), [0, 0, 0.5, 1, 1])
-    assert ease(np.array([0.01]))[0] < 4e-4
 
 
 def test_refusals(clips, phrases):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from kernels.assembly import quality
 from kernels.assembly.blend import Dance, Lineage, assemble
 from kernels.assembly.feet import clip_contacts, lock_feet, planted_feet
+from kernels.assembly.foot_quality import foot_measures
+from kernels.assembly.seam_quality import seam_measures
 from kernels.motion.contacts import FootContacts
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.canonical import CANONICAL
@@ -28,7 +29,7 @@ def dance(hops, clips):
 
 
 def slide(dance, steps, clips):
-    found = {m.name: m.value for m in quality.foot_measures(dance, steps, clips)}
+    found = {m.name: m.value for m in foot_measures(dance, steps, clips)}
     return found["foot_slide_cm_per_s"], found["source_foot_slide_cm_per_s"]
 
 
@@ -60,8 +61,7 @@ def test_bones_keep_their_lengths_and_seams_stay_smooth(dance, hops, clips):
     )
     np.testing.assert_allclose(np.linalg.norm(locked.rotation_wxyz, axis=-1), 1, atol=1e-9)
     rough, free = (
-        {m.name: m.value for m in quality.seam_measures(made, hops, clips, skeleton=CANONICAL)}
-        for made in (locked, dance)
+        {m.name: m.value for m in seam_measures(made, hops, clips, skeleton=CANONICAL)} for made in (locked, dance)
     )
     assert rough["seam_jerk_ratio"] < 1.1 * free["seam_jerk_ratio"]
     assert rough["seam_jerk_worst_ratio"] < 1.1 * free["seam_jerk_worst_ratio"]

@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from kernels import rotation
 from kernels.calibration.body_faults import find_body_faults, move_to_repeat
 from kernels.calibration.cleaning import clean
 from kernels.calibration.joints import solve_joints
@@ -36,13 +39,21 @@ def test_exchanged_labels_are_both_named(made, one, other):
     assert {one, other} == set(found[0].sentence.split(":")[0].split(", "))
 
 
+def test_labels_exchanged_in_a_ring_are_told_step_by_step(made):
+    ring = suit.swap(suit.swap(made.recording, {"l_upper_arm": "l_forearm"}), {"l_forearm": "l_hand"})
+    cleaned = clean(ring)
+    found = [one for one in find_body_faults(cleaned, solve_joints(cleaned)) if "exchange the labels" in one.sentence]
+    assert len(found) == 2
+    mended = ring
+    for one in found:
+        a, b = one.sentence.split(":")[0].split(", ")
+        mended = suit.swap(mended, {a: b})
+    np.testing.assert_array_equal(mended.is_valid, made.recording.is_valid)
+
+
 def test_the_world_may_be_turned(made, pairs, cleaned):
     # a rule that used the direction of gravity would fail here
     turn = np.array([0.5, -0.5, 0.5, 0.5])
-    from dataclasses import replace
-
-    from kernels import rotation
-
     turned = replace(
         cleaned,
         recording=replace(
@@ -52,6 +63,18 @@ def test_the_world_may_be_turned(made, pairs, cleaned):
         ),
     )
     assert find_body_faults(turned, pairs) == ()
+
+
+def test_a_sensor_that_is_not_on_the_body_is_an_error(made):
+    recording = made.recording
+    position, turned = recording.position_xyz_m.copy(), recording.rotation_wxyz.copy()
+    hand = SENSORS.index("l_hand")
+    jitter = np.random.default_rng(0).normal(0, 0.001, (len(position), 3))
+    position[:, hand] = np.where(recording.is_valid[:, hand, None], np.array([1.0, 0.2, 0.8]) + jitter, np.nan)
+    turned[recording.is_valid[:, hand], hand] = [0.6, 0.0, 0.8, 0.0]
+    found = faults(replace(made, recording=replace(recording, position_xyz_m=position, rotation_wxyz=turned)))
+    assert [(one.severity, one.sensor) for one in found] == [("error", "l_hand")]
+    assert "moves with l_forearm" in found[0].sentence
 
 
 def test_there_is_a_movement_for_every_joint():

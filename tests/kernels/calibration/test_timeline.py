@@ -139,3 +139,9 @@ def test_nothing_said_again_is_no_news():
     seen = collapse(np.arange(3.0), values)
     assert seen.is_new[:, 0].all()
     assert len(seen.row) == 3
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
+def test_times_in_a_finer_unit_are_named(scale, unit):
+    with pytest.raises(ValueError, match=unit):
+        timeline(np.arange(100) / 120 * scale)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from kernels.graph.costs import (
     PathCosts,
     is_within,
     jump_back_cost,
+    rough_cost,
     stride_cost,
     transition_cost,
     usage_cost,
@@ -86,3 +89,20 @@ def test_errors():
     ]:
         with pytest.raises(ValueError, match=message):
             PathCosts(**change)
+
+
+def test_rough_recordings_around_a_seam_by_hand(make_graph):
+    graph = make_graph([[0, 1, 2], [0, 1, 2], [0, 1, 2]], [(1, 4, 1.0), (1, 7, 1.0), (4, 7, 1.0)], both_ways=False)
+    usual = np.repeat([100.0, 400.0, 800.0], 3)
+    peak = np.where(np.arange(9) == 4, 1600.0, 50.0)
+    cost = rough_cost(replace(graph, peak_jerk=peak, usual_jerk=usual), PathCosts(rough=0.5))
+    found = dict(zip(zip(graph.source.tolist(), graph.target.tolist(), strict=True), cost, strict=True))
+    assert found == {(1, 4): 0.5 * 4**2, (1, 7): 0.0, (4, 7): 0.5 * 2**2}  # the median clip is the second
+
+
+def test_roughness_not_known_or_nowhere_costs_nothing(make_graph):
+    graph = make_graph([[0, 1, 2], [0, 1, 2]], [(1, 4, 1.0)])
+    np.testing.assert_array_equal(rough_cost(graph, PathCosts()), 0)
+    still = replace(graph, peak_jerk=np.zeros(6), usual_jerk=np.zeros(6))
+    np.testing.assert_array_equal(rough_cost(still, PathCosts()), 0)
+    assert len(rough_cost(make_graph([[0, 1]]), PathCosts())) == 0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.matching.pieces import ease_pace, longest_first, motion_under, snap_start, split_span
+from kernels.matching.pieces import ease_pace, longest_first, motion_under, other_starts, snap_start, split_span
 from kernels.motion.features import bumps
 
 SEGMENT = bumps(240, np.array([0.0, 60, 120, 180]), np.ones(4), width_s=0.05)
@@ -39,6 +39,41 @@ def test_far_beats_no_beats_and_the_ends_of_the_clip():
     assert snap(clip(60), 60, [90 / 120], 1.0) == 60
     assert snap(clip(60), 60, [], 1.0) == 60
     assert snap(clip(60)[:300], 60, [64 / 120], 1.0) == 60
+
+
+def others(clip_values, start, most=4, numerator=50, segment=SEGMENT):
+    found = other_starts(segment, clip_values, numerator=numerator, start_frame_index=start, most=most)
+    assert found.dtype == np.int64
+    return found.tolist()
+
+
+STEPS = bumps(600, 60.0 * np.arange(1, 10), np.ones(9), width_s=0.05)
+
+
+def test_steps_that_come_back_match_a_beat_on():
+    np.testing.assert_allclose(sorted(others(STEPS, 60, most=50)), [0, 120, 180, 240, 300, 360], atol=2)
+    assert others(STEPS, 60, most=2) == others(STEPS, 60, most=50)[:2]
+
+
+def test_other_starts_are_apart_and_within_the_clip():
+    found = [60, *others(STEPS, 60, most=50)]
+    assert min(np.diff(sorted(found))) >= 48
+    assert max(found) <= len(STEPS) - len(SEGMENT)
+    slow = others(STEPS, 60, numerator=55, most=50)
+    assert all(f + 1.1 * (len(SEGMENT) - 1) <= len(STEPS) - 1 for f in slow)
+
+
+def test_what_matches_far_less_is_no_other_start():
+    uneven = np.array([0.0, 50, 170])
+    once = bumps(600, 200 + uneven, np.ones(3), width_s=0.05)
+    assert others(once, 200, segment=bumps(240, uneven, np.ones(3), width_s=0.05)) == []
+
+
+def test_no_other_starts_of_silence_of_short_clips_or_where_none_are_wanted():
+    assert others(STEPS, 60, segment=np.zeros(240)) == []
+    assert others(np.zeros(600), 60) == []
+    assert others(STEPS[:200], 0) == []
+    assert others(STEPS, 60, most=0) == []
 
 
 def test_spans_are_cut_at_beats_and_evenly_without():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.motion.velocity import accents, jerk, kinematic_beats, mean_speed
+from kernels.motion.velocity import accents, jerk, jerk_around, kinematic_beats, mean_speed
 
 
 @pytest.fixture
@@ -87,3 +87,23 @@ def test_refusals(function):
         function(np.full((4, 1, 3), np.nan), 30.0)
     with pytest.raises(ValueError, match="> 0"):
         function(np.zeros((4, 1, 3)), -1.0)
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 60.0, 120.0])
+def test_jerk_around_a_moment_is_the_same_at_any_rate(rate_hz):
+    time_s = np.arange(round(6 * rate_hz)) / rate_hz
+    position = np.zeros((len(time_s), 2, 3))
+    position[:, 0, 0] = 0.1 * np.sin(2 * np.pi * time_s)
+    position[:, 1, 1] = np.where(np.abs(time_s - 3) < 0.5, 0.1 * np.sin(6 * np.pi * (time_s - 3)) ** 3, 0)
+    peak, usual = jerk_around(position, rate_hz, time_s=np.array([1.0, 3.0, 5.0]))
+    np.testing.assert_allclose(peak[[0, 2]], 0.1 * (2 * np.pi) ** 3, rtol=0.06)
+    assert peak[1] > 10 * peak[0]
+    assert peak[1] == pytest.approx(usual, rel=0.1)
+
+
+def test_jerk_around_nothing():
+    assert jerk_around(np.zeros((3, 1, 3)), 30.0, time_s=np.array([0.0, 0.05]))[0].tolist() == [0, 0]
+    peak, usual = jerk_around(np.zeros((90, 1, 3)), 30.0, time_s=np.zeros(0))
+    assert (len(peak), usual) == (0, 0.0)
+    with pytest.raises(ValueError, match="frame_rate_hz"):
+        jerk_around(np.zeros((90, 1, 3)), 0.0, time_s=np.zeros(0))

@@ -1,0 +1,246 @@
+"""Motion search: the trained encoder, the embedding of every clip, the index, and labels for clips without one."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import dagster as dg
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from assets import search_plots, search_tables, tables
+from assets.declare import table_asset
+from assets.lineage import (
+    Earlier,
+    Part,
+    Parts,
+    Progress,
+    Stored,
+    clip_versions,
+    code_version,
+    content_version,
+    per_clip,
+    repeatable,
+)
+from assets.partitions import EVERY, SESSION
+from assets.sources import Studio
+from kernels.search.encoder import Encoder, from_arrays
+from kernels.search.measure import leave_one_out
+from kernels.search.nearest import propose
+from kernels.search.normalise import resample
+from kernels.search.windows import windows
+from kernels.types import Float
+from schemas.search import LABEL_PROPOSAL, MOTION_EMBEDDING, MOTION_ENCODER, MOTION_INDEX
+from schemas.settings import SearchSettings
+
+_MOST_WINDOWS_A_CLIP = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Index:
+    """The search index: its rows, and the vector of each, (N, 512) float32."""
+
+    part: Part
+    vector: NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class _Example:
+    """One window to learn from."""
+
+    take: str
+    label: str
+    position_xyz_m: Float
+
+
+@table_asset(
+    MOTION_ENCODER,
+    group="search",
+    code_version="1",
+    settings="search",
+    keeps=True,
+    ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose")},
+)
+def motion_encoder(
+    clip: Stored, canonical_pose: Stored, studio: dg.ResourceParam[Studio], progress: dg.ResourceParam[Progress]
+) -> Part:
+    """Train the encoder on the catalogue; once made it is kept, so that what was embedded stays comparable."""
+    from kernels.search.fit import fit  # JAX: loaded where something is trained, and nowhere else
+    from kernels.search.train import Training
+
+    settings = studio.settings().search
+    examples = _examples(clip, canonical_pose, settings)
+    progress.begin("training the encoder", 2 * settings.training_steps)
+    with repeatable():
+        fitted = fit(
+            [e.position_xyz_m for e in examples],
+            [e.label for e in examples],
+            take=[e.take for e in examples],
+            how=Training(steps=settings.training_steps, seed=settings.seed, has_travel=settings.has_travel),
+            progress=progress.step,
+        )
+    labels = sorted({e.label for e in examples} - {""})
+    said = fitted.validation
+    provenance = {
+        "kind": fitted.kind,
+        "steps": fitted.steps,
+        "seed": settings.seed,
+        "windows": len(examples),
+        "clips": len({e.take for e in examples}),
+        "labels": labels,
+        "made_from": {key: canonical_pose.stamp(key).content for key in canonical_pose.keys},
+        "libraries": {name: version(name) for name in ("jax", "jaxlib", "equinox", "optax", "numpy")},
+        "validation": {
+            "first_ratio": said.first_ratio,
+            "mean_precision_ratio": said.mean_precision_ratio,
+            "queries": said.n_queries,
+        }
+        if said
+        else None,
+    }
+    table = search_tables.from_encoder(fitted.encoder.arrays(), json.dumps(provenance, sort_keys=True))
+    return Part("", table, metadata={"provenance": dg.MetadataValue.json(provenance)})
+
+
+def _examples(clip: Stored, canonical_pose: Stored, settings: SearchSettings) -> list[_Example]:
+    """Take windows to learn from: evenly spread in long clips, and of too many an even share."""
+    found = []
+    for key in canonical_pose.keys:
+        rows = {row["clip_id"]: row for row in clip.read(key).to_pylist() if row["state"] == "read"}
+        for moved in tables.to_canonical_poses(canonical_pose.read(key)):
+            if moved.clip_id not in rows:
+                continue
+            row = rows[moved.clip_id]
+            is_said = settings.labels == "folders" or (settings.labels == "clips.csv" and row["is_labelled"])
+            cut = _windows(moved.duration_s, settings)
+            at = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), _MOST_WINDOWS_A_CLIP)).round().astype(int))
+            found += [
+                _Example(
+                    moved.clip_id,
+                    row["label"] if is_said else "",
+                    resample(moved.position_xyz_m, moved.frame_rate_hz, start_s, end_s).astype(np.float32),
+                )
+                for start_s, end_s in cut[at].tolist()
+            ]
+    if len(found) > settings.training_windows:
+        chosen = np.random.default_rng(settings.seed).permutation(len(found))[: settings.training_windows]
+        found = [found[i] for i in sorted(chosen.tolist())]
+    return found
+
+
+def _windows(duration_s: float, settings: SearchSettings) -> Float:
+    longest = max(settings.longest_whole_s, settings.window_s)
+    return windows(duration_s, window_s=settings.window_s, longest_whole_s=longest)
+
+
+@table_asset(
+    MOTION_EMBEDDING,
+    group="search",
+    code_version="1",
+    settings="search.window_s search.longest_whole_s",
+    partitions=SESSION,
+)
+def motion_embedding(
+    context: dg.AssetExecutionContext,
+    canonical_pose: Stored,
+    motion_encoder: pa.Table,
+    studio: dg.ResourceParam[Studio],
+    earlier: dg.ResourceParam[Earlier],
+    progress: dg.ResourceParam[Progress],
+) -> Parts:
+    """Embed the windows of every clip; those of clips that did not change are carried over."""
+    settings = studio.settings().search
+    encoder = from_arrays(search_tables.to_encoder(motion_encoder))
+    made_by = (
+        code_version(context, MOTION_EMBEDDING.name),
+        content_version(motion_encoder),
+        repr((settings.window_s, settings.longest_whole_s)),
+    )
+
+    def session(key: str) -> Part:
+        poses = tables.by_clip(canonical_pose.read(key))
+
+        def one(clip_id: str) -> pa.Table:
+            return _embedded(tables.to_canonical_pose(poses[clip_id]), encoder, settings) if clip_id in poses else empty
+
+        made_from = clip_versions(canonical_pose, key, *made_by)
+        return per_clip(MOTION_EMBEDDING, key, made_from, one, earlier=earlier, progress=progress)
+
+    empty = MOTION_EMBEDDING.empty()
+    progress.begin("embedding clips", sum(len(canonical_pose.stamp(key).clips) for key in canonical_pose.keys))
+    return Parts(session(key) for key in canonical_pose.keys)
+
+
+def _embedded(moved: tables.CanonicalClip, encoder: Encoder, settings: SearchSettings) -> pa.Table:
+    cut = _windows(moved.duration_s, settings)
+    vector = encoder.embed(moved.position_xyz_m, moved.frame_rate_hz, cut)
+    return search_tables.from_motion_embedding(moved.clip_id, cut, vector)
+
+
+@table_asset(
+    MOTION_INDEX,
+    group="search",
+    code_version="1",
+    ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "motion_embedding")},
+    io_manager="index",
+)
+def motion_index(clip: Stored, motion_embedding: Stored, progress: dg.ResourceParam[Progress]) -> Index:
+    """Put the windows of all clips in one row, to be searched at once."""
+    progress.begin("indexing", len(motion_embedding.keys))
+    rows, vectors = search_tables.catalogue(
+        (clip.read(key), motion_embedding.read(key)) for key in _each(motion_embedding.keys, progress)
+    )
+    start = search_tables.starts(rows["clip_id"])
+    centre = search_tables.clip_vectors(vectors, start)
+    labels = [rows["label"][i] for i in start.tolist()]
+    is_labelled = np.array([rows["is_labelled"][i] for i in start.tolist()], bool)
+    with repeatable():
+        place = search_plots.places(centre)
+    found = leave_one_out(centre[is_labelled], [name for name, said in zip(labels, is_labelled, strict=True) if said])
+    table = search_tables.from_motion_index(rows, vectors, place, start)
+    metadata = {
+        "windows": len(vectors),
+        "clips": len(start),
+        "first_hit_has_label_ratio": found.first_ratio,
+        "map": dg.MetadataValue.md(search_plots.catalogue_map(place, labels)),
+        "confusion": dg.MetadataValue.md(search_plots.confusion(found)),
+    }
+    return Index(Part("", table, metadata=metadata), vectors)
+
+
+@table_asset(
+    LABEL_PROPOSAL,
+    group="search",
+    code_version="1",
+    ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "motion_embedding")},
+)
+def label_proposal(clip: Stored, motion_embedding: Stored) -> Part:
+    """Propose labels for the clips that clips.csv gives none, by their nearest labelled clips."""
+    rows, vectors = search_tables.catalogue(
+        (clip.read(key), motion_embedding.read(key)) for key in motion_embedding.keys
+    )
+    start = search_tables.starts(rows["clip_id"])
+    centre = search_tables.clip_vectors(vectors, start).astype(np.float64)
+    is_labelled = np.array([rows["is_labelled"][i] for i in start.tolist()], bool)
+    ids = [rows["clip_id"][i] for i in start.tolist()]
+    known, unknown = np.flatnonzero(is_labelled), np.flatnonzero(~is_labelled)
+    names, number = np.unique([rows["label"][start[i]] for i in known], return_inverse=True)
+    distance = np.sqrt(np.maximum(2 - 2 * centre[unknown] @ centre[known].T, 0.0))
+    usual = np.sqrt(np.maximum(2 - 2 * search_tables.likest(centre[known]), 0.0))
+    table = search_tables.from_proposals(
+        propose(distance, number) if len(known) else [],
+        [ids[i] for i in unknown],
+        [ids[i] for i in known],
+        names.tolist(),
+        far=float(np.percentile(usual, 95)) if len(usual) else 0.0,
+    )
+    counts = {"unlabelled_clips": len(unknown), "labelled_clips": len(known)}
+    return Part("", table, metadata={**counts, "proposals": dg.MetadataValue.md(search_plots.proposals(table))})
+
+
+def _each(keys: Sequence[str], progress: Progress) -> Iterator[str]:
+    for key in keys:
+        progress.step()
+        yield key

@@ -1,0 +1,50 @@
+"""Smoothness of seams: a seam that is none, plain cuts, one rough seam among smooth ones."""
+
+from kernels.assembly.seam_quality import seam_measures
+from kernels.skeleton.canonical import CANONICAL
+
+
+def values(measures):
+    return {m.name: m.value for m in measures}
+
+
+def passed(measures):
+    return {m.name: m.is_passed for m in measures}
+
+
+def test_seam_in_one_continuous_clip_is_as_smooth_as_the_clip(phrases, dance, clips):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("step", 3.25, 6, 0.5, 0.5))
+    found = seam_measures(dance(steps), steps, clips, skeleton=CANONICAL)
+    assert values(found)["seam_jerk_ratio"] < 1.05
+    assert passed(found)["seam_jerk_ratio"]
+
+
+def test_plain_cut_is_worse_than_a_blend(phrases, dance, clips):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5), ("wave", 0.75, 6, 0.5, 0.5), blend_s=0.4)
+    found = values(seam_measures(dance(steps), steps, clips, skeleton=CANONICAL))
+    assert found["seam_jerk_plain_cut_ratio"] > 3 * found["seam_jerk_ratio"]
+
+
+def test_one_rough_seam_is_not_hidden_by_smooth_ones(phrases, dance, clips):
+    going_on = [("step", 0.25 + 2 * i, 4, 0.5, 0.5) for i in range(3)]
+    steps = phrases(*going_on, ("wave", 0.75, 4, 0.5, 0.5), blend_s=0.05)
+    found = seam_measures(dance(steps), steps, clips, skeleton=CANONICAL)
+    assert values(found)["seam_jerk_median_ratio"] < 1.05
+    assert values(found)["seam_jerk_ratio"] == values(found)["seam_jerk_worst_ratio"] > 1.5
+    assert not passed(found)["seam_jerk_ratio"]
+
+
+def test_one_rough_seam_in_many_is_told_and_passes(phrases, dance, clips):
+    going_on = [("step", 0.25 + 0.25 * i, 1, 0.25, 0.25) for i in range(29)]
+    steps = phrases(*going_on, ("wave", 0.75, 4, 0.5, 0.5), blend_s=0.05)
+    found = values(seam_measures(dance(steps), steps, clips, skeleton=CANONICAL))
+    assert found["seam_count"] == 29
+    assert found["seam_jerk_worst_ratio"] > 1.5
+    assert found["seam_jerk_ratio"] < found["seam_jerk_worst_ratio"]
+
+
+def test_no_seam_is_no_trouble(phrases, dance, clips):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5))
+    found = seam_measures(dance(steps), steps, clips, skeleton=CANONICAL)
+    assert values(found)["seam_count"] == 0
+    assert passed(found)["seam_jerk_ratio"]

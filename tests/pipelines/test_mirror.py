@@ -1,0 +1,43 @@
+"""Mirrored clips: twice the graph, danced and told as what they are."""
+
+import numpy as np
+import polars as pl
+import pyarrow.parquet as pq
+
+from assets import tables
+from kernels.skeleton.canonical import mirror
+from pipelines import commands
+from pipelines.resources import NoProgress
+
+
+def rows(studio, table, part="all"):
+    return pq.read_table(studio / "lake" / table / f"{part}.parquet")
+
+
+def test_a_mirrored_catalogue_is_twice_as_large_and_its_dance_says_what_is_mirrored(studio):
+    plain = rows(studio, "motion_graph_node").num_rows
+    (studio / "odori.toml").write_text("[motion_graph]\nmirror = true\n")
+    asked = {"method": "graph", "frame_rate_hz": None, "out": None, "progress": NoProgress}
+    outcome = commands.dance(studio, ["beat"], pins=["3-5=step"], **asked)
+    assert outcome.status == 0, outcome.troubles
+    node = rows(studio, "motion_graph_node")
+    assert node.num_rows == 2 * plain
+    assert sum(node["is_mirrored"].to_pylist()) == plain
+    lineage = pl.DataFrame(rows(studio, "frame_lineage", "beat|graph"))
+    pinned = lineage.filter(pl.col("time_s").is_between(3.0, 5.0))
+    assert all(clip.endswith("-step") for clip in pinned["clip_id"])
+    assert lineage["is_mirrored"].any()
+    alone = lineage.filter(pl.col("is_mirrored") & pl.col("blend_clip_id").is_null())
+    frame = int(alone["frame_index"][len(alone) // 2])
+    told = commands.why(studio, "beat", at_s=frame / 30.0)
+    assert told.facts["is_mirrored"]
+    here = alone.filter(pl.col("frame_index") == frame).row(0, named=True)
+    session = here["clip_id"].partition("-")[0]
+    poses = tables.by_clip(rows(studio, "canonical_pose", session))[here["clip_id"]]
+    moved = tables.to_canonical_pose(poses)
+    _, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
+    at = min(round(here["clip_time_s"] * moved.frame_rate_hz), len(turned) - 1)
+    shown = tables.to_array(rows(studio, "dance_pose", "beat|graph")["rotation_wxyz"])[frame]
+    arms = [tables.JOINTS.index(f"{side}UpperArm") for side in ("left", "right")]
+    unlike = [np.abs(np.abs((shown[arms] * q[at][arms]).sum(-1)) - 1).max() for q in (turned, moved.rotation_wxyz)]
+    assert unlike[0] < 2e-3

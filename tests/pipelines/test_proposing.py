@@ -1,0 +1,43 @@
+"""odori dance --propose: a list, and no dance."""
+
+import json
+
+import pytest
+
+from pipelines import commands
+from pipelines.files import StudioError
+from pipelines.resources import NoProgress
+
+
+def test_a_list_to_choose_from(built):
+    before = sorted((built / "lake" / "request").glob("*"))
+    outcome = commands.propose(built, "beat", "4", progress=NoProgress)
+    assert outcome.status == 0
+    facts = outcome.facts
+    labels = {row["label"]: row["extra_cost"] for row in facts["labels"]}
+    assert set(labels) | set(facts["out_of_reach"]["labels"]) == {"step", "twist", "wave", "rock", "kick"}
+    assert min(labels.values()) == pytest.approx(0.0, abs=1e-9)
+    assert facts["from_s"] <= 4.0 <= facts["to_s"]
+    assert facts["labels"][0]["pin"] == f"4={facts['labels'][0]['label']}"
+    assert "what could be pinned there" in outcome.report
+    assert sorted((built / "lake" / "request").glob("*")) == before
+    json.dumps(facts)
+
+
+def test_other_pins_count(built):
+    plain = commands.propose(built, "beat", "4", progress=NoProgress).facts
+    pinned = commands.propose(built, "beat", "4", pins=["4=kick"], progress=NoProgress).facts
+    assert pinned["pins"] == ["4=kick"]
+    assert [row["label"] for row in pinned["labels"]] == ["kick"]
+    kick = next(row for row in plain["labels"] if row["label"] == "kick")
+    assert pinned["best_cost"] == pytest.approx(plain["best_cost"] + kick["extra_cost"])
+
+
+def test_what_cannot_be_proposed(built):
+    refused = commands.propose(built, "beat", "4", pins=["8=nothing"], progress=NoProgress)
+    assert refused.status == 2
+    assert refused.facts["conflict"] == ["8=nothing"]
+    with pytest.raises(StudioError, match="--propose: 99: want seconds within the song"):
+        commands.propose(built, "beat", "99", progress=NoProgress)
+    with pytest.raises(StudioError, match="--pin: "):
+        commands.propose(built, "beat", "4", pins=["x"], progress=NoProgress)
