@@ -49,7 +49,7 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
     }
     if method == "hmm":
         model = hmm_report.model_facts(studio.lake)
-        facts["model"] = model | {"notes": [*model["notes"], *hmm_report.dance_notes(report["wanted"])]}
+        facts["model"] = model | {"notes": [*model["notes"], *hmm_report.dance_notes(report)]}
     if alternative_number(method) > 1:
         facts |= _difference(studio, song, base_method(method), steps)
     return facts

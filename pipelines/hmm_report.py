@@ -39,9 +39,9 @@ def model_facts(lake: Lake) -> dict[str, Any]:
     }
 
 
-def dance_notes(wanted: dict[str, Any]) -> list[str]:
+def dance_notes(report: dict[str, Any]) -> list[str]:
     """Say why a dance is not as wanted, where that is known: its tempo is none the dancer moved at, or it is short."""
-    notes = []
+    wanted, notes = report["wanted"], []
     if _failed(wanted, "warp_easy_ratio"):
         notes.append(
             "motions as long as the song's beats ask for are few: they are danced beyond 0.90 to 1.10 of their pace; "
@@ -49,6 +49,11 @@ def dance_notes(wanted: dict[str, Any]) -> list[str]:
         )
     if _failed(wanted, "beat_p_probability"):
         notes.append("too short, or moving too evenly, for its beats to be told from chance by an independent eye")
+    if _failed(wanted, "seam_jerk_ratio") and wanted["seam_jerk_ratio"]["value"] <= 1.5:
+        notes.append(
+            "seams are within 1.5 of the clips' own jerk, but poses there are so alike that a plain cut is as smooth: "
+            "blends have nothing to better"
+        )
     return notes
 
 
