@@ -52,7 +52,6 @@ TESTED_ELSEWHERE = {
     "assets/matching.py",
     "assets/hmm.py",
     "assets/hmm_path.py",
-    "assets/percussion.py",
     "assets/motion.py",
     "assets/search.py",
     "assets/music.py",
