@@ -157,6 +157,8 @@ def dance(
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
     methods = {song.key: _ways(method or _briefed_method(studio, song), alternatives) for song in songs}
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
+    if temperature is not None and not any(key.endswith("|hmm") for key in keys):
+        raise StudioError("--temperature: want the method hmm, which draws dances, got another; add --method hmm")
     before = studio.requests()
     for key in sorted(keys):
         studio.remember(key, Request(frame_rate_hz or 0.0, pins, character, temperature, seed))

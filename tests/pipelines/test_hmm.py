@@ -199,5 +199,9 @@ def test_pins_are_refused_and_say_where_they_are_kept(studio):
 def test_temperature_is_bounded(studio):
     from pipelines.files import StudioError
 
-    with pytest.raises(StudioError, match="--temperature"):
+    with pytest.raises(StudioError, match="--temperature: want 0 to 10"):
         dance(studio, "new", temperature=-1.0)
+    with pytest.raises(StudioError, match="want the method hmm"):
+        commands.dance(
+            studio, ["new"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress, temperature=1.0
+        )
