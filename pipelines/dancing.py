@@ -14,6 +14,7 @@ from assets.graph_path import direction_of
 from assets.partitions import alternative_number, base_method
 from assets.stage import COSTS
 from kernels.assembly.timing import cover
+from pipelines import hmm_report
 from pipelines.files import StudioError, write_beside
 from pipelines.resources import StudioFolder
 from schemas.choreography import CHOREOGRAPHY
@@ -46,6 +47,9 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
         "character": report["provenance"].get("character"),
         "pins": _pin_facts(studio, song, method, steps),
     }
+    if method == "hmm":
+        model = hmm_report.model_facts(studio.lake)
+        facts["model"] = model | {"notes": [*model["notes"], *hmm_report.dance_notes(report)]}
     if alternative_number(method) > 1:
         facts |= _difference(studio, song, base_method(method), steps)
     return facts
@@ -147,6 +151,8 @@ def report_of(facts: dict[str, Any]) -> str:
     ]
     if facts["not_as_wanted"]:
         lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")
+    if "model" in facts:
+        lines += hmm_report.report_lines(facts["model"])
     return "\n".join(lines)
 
 
