@@ -147,6 +147,8 @@ def dance(
     if out is not None:
         dancing.check_out(out)
     pins = _pin_texts(pins, root, progress)
+    if temperature is not None and not 0 <= temperature <= 10:
+        raise StudioError(f"--temperature: want 0 to 10, got {temperature:g}")
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
     work = Session(studio, progress)
@@ -156,6 +158,8 @@ def dance(
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
     methods = {song.key: _ways(method or _briefed_method(studio, song), alternatives) for song in songs}
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
+    if temperature is not None and not any(key.endswith("|hmm") for key in keys):
+        raise StudioError("--temperature: want the method hmm, which draws dances, got another; add --method hmm")
     before = studio.requests()
     for key in sorted(keys):
         studio.remember(key, Request(frame_rate_hz or 0.0, pins, character, temperature, seed))
