@@ -68,9 +68,10 @@ def _difference(studio: StudioFolder, song: str, best: str, steps: pl.DataFrame)
     )
     n = min(len(frames), len(other))
     frames, other = frames.head(n), other.head(n)
-    is_same = (frames["clip_id"] == other["clip_id"]) & ((frames["clip_time_s"] - other["clip_time_s"]).abs() < NEAR_S)
-    shown = set(zip(other["clip_id"], _cell(other), strict=True))
-    is_shared = [moment in shown for moment in zip(frames["clip_id"], _cell(frames), strict=True)]
+    is_near = (frames["clip_time_s"] - other["clip_time_s"]).abs() < NEAR_S
+    is_same = (frames["clip_id"] == other["clip_id"]) & (frames["is_mirrored"] == other["is_mirrored"]) & is_near
+    shown = set(_moments(other))
+    is_shared = [moment in shown for moment in _moments(frames)]
     clips = set(steps["clip_id"])
     return {
         "same_ratio": int(is_same.sum()) / max(n, 1),
@@ -83,8 +84,10 @@ NEAR_S = 0.1
 """Moments of a clip no further apart count as the same."""
 
 
-def _cell(frames: pl.DataFrame) -> pl.Series:
-    return (frames["clip_time_s"] / NEAR_S).round().cast(pl.Int64)
+def _moments(frames: pl.DataFrame) -> list[tuple[str, bool, int]]:
+    """Name what each frame shows: clip, mirrored or not, moment."""
+    cell = (frames["clip_time_s"] / NEAR_S).round().cast(pl.Int64)
+    return list(zip(frames["clip_id"], frames["is_mirrored"], cell, strict=True))
 
 
 def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame) -> list[dict[str, Any]]:
