@@ -32,9 +32,10 @@ lint: $(STAMP) ## style, types, import contracts
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 
-docs: $(STAMP) ## docs/data.md, docs/settings.md and docs/asset-graph.svg, from the declarations
+docs: $(STAMP) ## docs/data.md, docs/settings.md and the pictures of docs, from what is declared and measured
 	@$(BIN)/python docs/generate.py
 	@$(BIN)/python docs/draw_graph.py
+	@$(BIN)/python docs/draw_springs.py
 
 $(BLENDER)/.installed: requirements-blender.lock $(STAMP)
 	@$(BIN)/python -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \

@@ -3,7 +3,7 @@
 import dagster as dg
 import pyarrow as pa
 
-from assets import tables
+from assets import licences, tables
 from assets.declare import table_asset
 from assets.graph_path import by_graph, catalogue, direction_of, heard_song, read_clips
 from assets.hmm_path import by_hmm, load_dancer
@@ -29,7 +29,6 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
     methods={
         "motion_graph_node": "graph",
         "motion_graph_edge": "graph",
-        "clip": "graph,hmm",
         "[path]": "graph",
         "match": "matching",
         "music_segment": "matching",
@@ -118,13 +117,13 @@ def choreography(
                 temperature=request.temperature,
                 seed=request.seed,
             )
-    elif asked.allow:
-        raise dg.Failure(
-            f"{song_id}: licences are kept by the methods graph and hmm alone; dance it with --method graph",
-            allow_retries=False,
-        )
     else:
-        found = load_matches(song_id, match, music_segment, music_feature, motion_feature, motion_beat)
+        licence_of = dict(read_clips([clip.read(s) for s in clip.keys]).select("clip_id", "licence").iter_rows())
+        free = licences.free_to_join(licence_of, asked.allow)
+        if licence_of and not free:
+            why = f"has a licence of {', '.join(asked.allow)}" if asked.allow else "may be changed"
+            raise dg.Failure(f"no clip may be danced: none {why}", allow_retries=False)
+        found = load_matches(song_id, match, music_segment, music_feature, motion_feature, motion_beat, may_dance=free)
         with repeatable():
             danced = by_matching(found, canonical_pose, beat_s, settings)
     progress.step()

@@ -42,7 +42,7 @@ def table_asset(
     group : area of the asset graph
     code_version : raised by hand when the meaning of the output changes
     settings : sections of ``odori.toml`` it reads, or single keys as ``section.key``, separated by spaces
-    sources : "clips", "song" or "request" when it reads source files of its partition
+    sources : "clips", "song", "request" or "character" when it reads source files of its partition
     partitions : how it is cut; many sessions or songs are made in one run
     ins : inputs whose partitions do not match its own
     checks : asset checks it yields, by name, each with what it believes

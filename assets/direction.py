@@ -1,6 +1,7 @@
 """What a director asks of a dance, brought onto the beats of a song and the nodes of the motion graph."""
 
 import difflib
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -60,9 +61,22 @@ class Nodes:
             return np.asarray(self.label != wish.not_label)
         return np.asarray(self.label == wish.label)
 
-    def labels(self) -> dict[str, NDArray[np.bool_]]:
-        """Nodes of each label, in alphabetical order."""
-        return {str(label): self.label == label for label in np.unique(self.label)}
+    def instead_of(self, wish: PinWish) -> dict[str, NDArray[np.bool_]]:
+        """List what could be wished instead, as one would write it, and the nodes of each.
+
+        Of the same kind: labels for a label or none, styles for a style, clips for a clip; what is spelt alike first,
+        then what there is most of. After clips come labels.
+        """
+        kinds = {"clip:": self.clip_id} if wish.clip else {"style:": self.style} if wish.style else {}
+        wanted = wish.clip or wish.style or wish.label
+        found: dict[str, NDArray[np.bool_]] = {}
+        for prefix, names in {**kinds, "": self.label}.items():
+            known, count = np.unique(names[names != ""], return_counts=True)
+            alike = difflib.get_close_matches(wanted, known.tolist(), n=5, cutoff=0.6)
+            often = [str(name) for _, name in sorted(zip(-count, known, strict=True))]
+            rest = often if prefix != "clip:" else []
+            found |= {f"{prefix}{name}": names == name for name in [*alike, *rest]}
+        return found
 
 
 def to_pin(wish: PinWish, song: Song, nodes: Nodes) -> Pin:
@@ -98,7 +112,10 @@ def stretch(wish: PinWish, song: Song) -> tuple[int, int]:
     """
     n = len(song.grid_s) - 1
     if wish.place:
-        return (0, 1) if wish.place == "start" else (n - 1, n)
+        # A first or last interval of which the song has less than half is no moment of its own.
+        seen = np.diff(np.clip(song.grid_s, 0.0, song.duration_s)) >= np.diff(song.grid_s) / 2
+        whole = np.flatnonzero(seen) if seen.any() else np.arange(n)
+        return (0, int(whole[0]) + 1) if wish.place == "start" else (int(whole[-1]), n)
     if wish.beat:
         return _counted(wish, "beat", wish.beat, wish.until_beat or wish.beat + 1, np.arange(len(song.own)) + 1, song)
     if wish.bar:
@@ -148,25 +165,42 @@ def sentences(
     those = [wishes[i] for i in conflict.pin_index]
     names = ", ".join(w.text for w in those)
     reason = {
-        "nothing": f"no clip with beats is {_called(those[0])}{_near(those[0], nodes)}",
+        "nothing": f"what is {_called(those[0])} may not be danced: its licence is not among those of 'allow'"
+        if nodes.wished(those[0]).any()
+        else f"no clip with beats is {_called(those[0])}{_near(those[0], nodes)}",
         "tempo": "what it wishes has no beats near enough to the song's tempo there (warp 0.80 to 1.25)",
         "start": "no way through the motion graph leads there in time, or from there to the end of the song",
-        "path": "each of them can be kept, but no way through the motion graph keeps them all",
+        "same_time": "each of them can be kept, but no clip is all of this at the same time",
+        "path": "each of them can be kept, but no way through the motion graph keeps them all"
+        + _within([pins[i] for i in conflict.pin_index]),
     }[conflict.reason]
     ways = [way_out(way, pins, wishes, song) for way in conflict.ways_out]
     return [f"{names}: {reason}", *(f"would do: {way}" for way in ways)]
 
 
+def _within(pins: Sequence[Pin]) -> str:
+    """Say how few beats lie between pins that cannot both be kept; "" where they do not follow each other."""
+    ordered = sorted(pins, key=lambda pin: pin.first)
+    gaps = [after.first - before.last for before, after in itertools.pairwise(ordered)]
+    if not gaps or min(gaps) < 0:
+        return ""
+    between = ", ".join(str(gap) for gap in gaps)
+    return f" ({between} beat{'s' * (gaps != [1])} between them)"
+
+
 def way_out(way: WayOut, pins: Sequence[Pin], wishes: Sequence[PinWish], song: Song) -> str:
-    """Write a way out as a person would type it."""
+    """Write a way out as a person would type it: the pin first, then how it differs."""
     pin, wish = pins[way.pin_index], wishes[way.pin_index]
     if way.choice:
         return f"{wish.text.partition('=')[0]}={way.choice} in place of {wish.text}"
-    first, last = song.grid_s[pin.first + way.shift_beats], song.grid_s[pin.last + way.shift_beats]
-    beats = (
-        f"{abs(way.shift_beats)} beat{'s' * (abs(way.shift_beats) > 1)} {'later' if way.shift_beats > 0 else 'earlier'}"
-    )
-    return f"{max(first, 0):.2f}-{last:.2f}={wish.text.partition('=')[2]}, {beats} than {wish.text}"
+    n, wished = way.shift_beats, wish.text.partition("=")[2]
+    beats = f"{abs(n)} beat{'s' * (abs(n) > 1)} {'later' if n > 0 else 'earlier'} than {wish.text}"
+    first, last = song.grid_s[pin.first + n], song.grid_s[pin.last + n]
+    if pin.last == pin.first + 1:
+        return f"{min(max((first + last) / 2, 0.01), song.duration_s):.2f}={wished}, {beats}"
+    # Rounded inwards: a hundredth too early would name another beat as well.
+    from_s, to_s = max(np.ceil(100 * first) / 100, 0.0), np.floor(100 * min(last, song.duration_s)) / 100
+    return f"{from_s:.2f}-{to_s:.2f}={wished}, {beats}"
 
 
 def _called(wish: PinWish) -> str:

@@ -1,6 +1,5 @@
 """A dance through the motion graph, as its director wants it: pins, licences, alternatives."""
 
-import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -221,7 +220,13 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
     usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
     if not reach.is_danceable:
         return  # the search says why there is no dance at all
-    conflict = find_conflict(reach, usable, choices=_choices(known, asked))
+    conflict = find_conflict(
+        reach,
+        usable,
+        choices=[
+            {name: nodes & known.is_allowed for name, nodes in known.nodes.instead_of(w).items()} for w in asked.wishes
+        ],
+    )
     if conflict is None:
         return
     told = direction.sentences(conflict, usable, asked.wishes, song, known.nodes)
@@ -236,17 +241,6 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
         },
         allow_retries=False,
     )
-
-
-def _choices(known: Catalogue, asked: Direction) -> dict[str, NDArray[np.bool_]]:
-    """Labels to try in place of what is wished, those spelt alike first."""
-    wished = [wish.label for wish in asked.wishes if wish.label]
-    labels = known.nodes.labels()
-
-    def unlike(label: str) -> float:
-        return -max((difflib.SequenceMatcher(None, label, wish).ratio() for wish in wished), default=0.0)
-
-    return {label: labels[label] for label in sorted(labels, key=lambda label: (unlike(label), label))}
 
 
 def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:

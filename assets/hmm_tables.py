@@ -13,7 +13,7 @@ from assets.tables import by_clip, from_rows, to_array, to_numbers, vectors
 from kernels.hmm.evidence import Evidence
 from kernels.hmm.model import Model
 from kernels.hmm.states import States
-from kernels.motion.key_poses import KeyPoses
+from kernels.motion.key_poses import KeyPoses, to_poses, to_vectors
 from kernels.music.percussion import CONTOUR, FIRST_KEY, N_KEYS, Contour, Hits
 from kernels.types import Float, Int
 from schemas.hmm import BASIC_MOTION, CHOREOGRAPHY_MODEL, KEY_POSE, MUSIC_EVIDENCE, PERFORMANCE
@@ -76,7 +76,7 @@ def from_basic_motion(states: States, clip_ids: Sequence[str], start_s: Float, e
         pa.array(end_s),
         pa.array(states.count, pa.int32()),
         pa.array(states.reach),
-        vectors(states.centroid.reshape(k, -1, 3)),
+        vectors(to_poses(states.centroid).reshape(k, -1, 3)),
     ]
     return BASIC_MOTION.check(pa.table(columns, schema=BASIC_MOTION.arrow))
 
@@ -85,7 +85,7 @@ def to_states(table: pa.Table) -> States:
     """Unpack basic motions."""
     k = table.num_rows
     return States(
-        to_array(table["pose_xyz_m"]).reshape(k, -1) if k else np.zeros((0, 0)),
+        to_vectors(to_array(table["pose_xyz_m"]).reshape(k, 3, -1, 3)) if k else np.zeros((0, 0)),
         to_numbers(table["reach_m"]).astype(np.float64),
         to_numbers(table["motion_count"]).astype(np.int64),
     )

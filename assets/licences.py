@@ -192,6 +192,23 @@ def may_be_joined(licence: str) -> bool:
     return not terms_of(licence).no_derivatives
 
 
+def free_to_join(licence_of: Mapping[str, str], allow: Iterable[str]) -> set[str]:
+    """Find the clips that may be danced in pieces, blended with others.
+
+    Parameters
+    ----------
+    licence_of : licence by clip
+    allow : licences that may be danced; all where empty
+
+    Returns
+    -------
+    set of clips
+        Those of an allowed licence that may be changed.
+    """
+    allowed = tuple(allow)
+    return {clip for clip, name in licence_of.items() if is_allowed(name, allowed) and may_be_joined(name)}
+
+
 def is_allowed(licence: str, allow: Iterable[str]) -> bool:
     """Whether a clip of this licence may be danced where only some are allowed; all are where none is named."""
     names = {name.strip().lower() for name in allow}

@@ -22,11 +22,27 @@ class SegmentMatcher(Protocol):
     """Finds the best clips of segments; see :class:`kernels.matching.search.Matcher`."""
 
     def index(self, clips: Sequence[NDArray[Any]]) -> Any:  # noqa: ANN401 - what only the matcher itself reads
-        """Prepare a catalogue for many songs."""
+        """Prepare a catalogue for many songs.
+
+        Parameters
+        ----------
+        clips : sequence of (T,) float, finite, >= 0, in ascending order of their keys
+        """
         ...
 
     def matches(self, segments: Sequence[NDArray[Any]], clips: Any, *, k: int) -> Sequence[Sequence[Match]]:  # noqa: ANN401
-        """Find the k best clips of every segment, of an index or of clips."""
+        """Find the k best clips of every segment, of an index or of clips.
+
+        Parameters
+        ----------
+        segments : sequence of (L,) float, L >= 1, finite, >= 0
+        clips : what :meth:`index` made, or clips
+        k : int, >= 1
+
+        Returns
+        -------
+        one list a segment, the best first
+        """
         ...
 
 
@@ -85,7 +101,17 @@ def match(
 
 
 def catalogue(motion_feature: Stored) -> tuple[dict[str, Rhythm], list[str]]:
-    """Rhythm of every clip as stored, and the clips left out because theirs is none to compare with."""
+    """Rhythm of every clip as stored, and the clips left out because theirs is none to compare with.
+
+    Parameters
+    ----------
+    motion_feature : Stored, features of clips by session
+
+    Returns
+    -------
+    rhythms : (F,) float32 by clip_id
+    left_out : one sentence a clip
+    """
     rhythms: dict[str, Rhythm] = {}
     left_out = []
     for key in motion_feature.keys:

@@ -20,7 +20,16 @@ _MOST_CLIPS = 6
 
 
 def session_features(features: pa.Table) -> str:
-    """Show the features of a session's first clips: rhythm as bumps, intensity, contacts below; and a table of all."""
+    """Show the features of a session's first clips: rhythm as bumps, intensity, contacts below; and a table of all.
+
+    Parameters
+    ----------
+    features : rows of ``motion_feature``, of one session
+
+    Returns
+    -------
+    str, Markdown; a table without rows where there is no clip
+    """
     clips = by_clip(features)
     rows = []
     for clip_id, own in clips.items():
@@ -51,7 +60,17 @@ def session_features(features: pa.Table) -> str:
 
 
 def song_features(time_s: Float, rhythm: Float, intensity: Float, segments: Segments) -> str:
-    """Show a song's rhythm and intensity, cut into its segments, with how much the music changes at each cut."""
+    """Show a song's rhythm and intensity, cut into its segments, with how much the music changes at each cut.
+
+    Parameters
+    ----------
+    time_s, rhythm, intensity : (F,) float, seconds and features of the song
+    segments : Segments of it
+
+    Returns
+    -------
+    str, Markdown
+    """
     figure = figure_of(12, 3)
     axes = figure.add_subplot()
     axes.fill_between(time_s, rhythm, color=WARM, alpha=0.6, linewidth=0)
@@ -73,7 +92,17 @@ def song_features(time_s: Float, rhythm: Float, intensity: Float, segments: Segm
 
 
 def segment_matches(segments: Segments, found: Sequence[StoredMatches]) -> str:
-    """Show segments against their best matches: score of every rank, scale and clip of the best; and a table."""
+    """Show segments against their best matches: score of every rank, scale and clip of the best; and a table.
+
+    Parameters
+    ----------
+    segments : S Segments
+    found : S StoredMatches, empty ones for segments without
+
+    Returns
+    -------
+    str, Markdown
+    """
     figure = figure_of(12, 5)
     score, scale, clip = figure.subplots(3, 1, sharex=True, height_ratios=(2, 1, 2))
     middle = (segments.start_s + segments.end_s) / 2
@@ -113,7 +142,18 @@ def segment_matches(segments: Segments, found: Sequence[StoredMatches]) -> str:
 
 
 def matched_curves(title: str, music: Float, motions: Sequence[tuple[str, Float]]) -> str:
-    """Lay one segment's rhythm over that of its best matches, read at their scales."""
+    """Lay one segment's rhythm over that of its best matches, read at their scales.
+
+    Parameters
+    ----------
+    title : str
+    music : (L,) float, rhythm of the segment
+    motions : a name and (L,) float each, rhythm of the clips under it
+
+    Returns
+    -------
+    str, Markdown; empty without motions
+    """
     if not motions:
         return ""
     figure = figure_of(10, 0.6 + 1.2 * len(motions))
@@ -127,7 +167,18 @@ def matched_curves(title: str, music: Float, motions: Sequence[tuple[str, Float]
 
 
 def chosen(spans: Float, pieces: Sequence[Any], found: Chosen) -> str:
-    """List what was chosen, one row a span: rank, costs, and whether its seam is within the thresholds."""
+    """List what was chosen, one row a span: rank, costs, and whether its seam is within the thresholds.
+
+    Parameters
+    ----------
+    spans : (S + 1,) float, seconds of the song
+    pieces : S pieces, :class:`assets.sequence.Piece`
+    found : Chosen, of S spans
+
+    Returns
+    -------
+    str, Markdown
+    """
     rows = [
         (
             i,

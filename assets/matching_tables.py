@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,7 +25,18 @@ Rhythm = NDArray[np.float32]
 
 
 def from_motion_feature(clip_id: str, found: MotionFeatures, contact: NDArray[np.bool_]) -> pa.Table:
-    """Pack a clip's features, F rows; ``contact`` is (F, 2), left first."""
+    """Pack a clip's features, F rows; ``contact`` is (F, 2), left first.
+
+    Parameters
+    ----------
+    clip_id : str
+    found : MotionFeatures, of F values
+    contact : (F, 2) bool, left first
+
+    Returns
+    -------
+    pa.Table, ``motion_feature``, F rows
+    """
     f = len(found.rhythm)
     columns = [
         pa.array([clip_id] * f, pa.string()),
@@ -41,12 +53,31 @@ def from_motion_feature(clip_id: str, found: MotionFeatures, contact: NDArray[np
 
 
 def to_rhythms(table: pa.Table) -> dict[str, Rhythm]:
-    """Unpack the rhythm of every clip as it is stored: float32, in the table's order of clips."""
+    """Unpack the rhythm of every clip as it is stored: float32, in the table's order of clips.
+
+    Parameters
+    ----------
+    table : ``motion_feature``, of any clips
+
+    Returns
+    -------
+    (F,) float32 by clip_id; empty without rows
+    """
     return {clip: np.asarray(to_numbers(rows["rhythm"]), np.float32) for clip, rows in by_clip(table).items()}
 
 
 def from_music_feature(song_id: str, found: MusicFeatures) -> pa.Table:
-    """Pack a song's features, F rows."""
+    """Pack a song's features, F rows.
+
+    Parameters
+    ----------
+    song_id : str
+    found : MusicFeatures, of F values
+
+    Returns
+    -------
+    pa.Table, ``music_feature``, F rows
+    """
     columns = [
         pa.array([song_id] * len(found.rhythm), pa.string()),
         pa.array(found.time_s),
@@ -57,7 +88,17 @@ def from_music_feature(song_id: str, found: MusicFeatures) -> pa.Table:
 
 
 def from_music_segment(song_id: str, segments: Segments) -> pa.Table:
-    """Pack a song's segments, S rows."""
+    """Pack a song's segments, S rows.
+
+    Parameters
+    ----------
+    song_id : str
+    segments : S Segments
+
+    Returns
+    -------
+    pa.Table, ``music_segment``, S rows
+    """
     s = len(segments.start_s)
     columns = [
         pa.array([song_id] * s, pa.string()),
@@ -109,7 +150,16 @@ def to_music_repeat(rows: pa.Table, grid_s: Float) -> list[Repeat]:
 
 
 def to_music_segment(rows: pa.Table) -> Segments:
-    """Unpack a song's segments."""
+    """Unpack a song's segments.
+
+    Parameters
+    ----------
+    rows : ``music_segment`` of one song
+
+    Returns
+    -------
+    Segments
+    """
     return Segments(
         to_numbers(rows["start_s"]).astype(np.float64),
         to_numbers(rows["end_s"]).astype(np.float64),
@@ -120,13 +170,34 @@ def to_music_segment(rows: pa.Table) -> Segments:
 
 
 def segment_rhythms(segments: Segments, rhythm: Rhythm) -> list[Rhythm]:
-    """Cut a song's rhythm into its segments."""
+    """Cut a song's rhythm into its segments.
+
+    Parameters
+    ----------
+    segments : S Segments
+    rhythm : (F,) float32, of the whole song
+
+    Returns
+    -------
+    S views of it, (L,) each
+    """
     ends = segments.start_frame_index + segments.frame_count
     return [rhythm[a:b] for a, b in zip(segments.start_frame_index, ends, strict=True)]
 
 
 def from_matches(song_id: str, found: Sequence[Sequence[Match]], clip_ids: Sequence[str]) -> pa.Table:
-    """Pack the matches of a song, best first within each segment; ``clip_ids`` by clip index."""
+    """Pack the matches of a song, best first within each segment; ``clip_ids`` by clip index.
+
+    Parameters
+    ----------
+    song_id : str
+    found : one list of Match a segment
+    clip_ids : names by clip index
+
+    Returns
+    -------
+    pa.Table, ``match``, one row a match
+    """
     every = [m for matches in found for m in matches]
     columns = [
         pa.array([song_id] * len(every), pa.string()),
@@ -161,9 +232,31 @@ class StoredMatches:
     music_ratio: Float
     mutual_ratio: Float
 
+    def only(self, kept: Sequence[bool]) -> StoredMatches:
+        """Take some of them, by (N,) truths."""
+        mask = np.array(kept, bool)
+        return StoredMatches(
+            tuple(itertools.compress(self.clip_ids, mask)),
+            self.numerator[mask],
+            self.start_frame_index[mask],
+            self.score[mask],
+            self.music_ratio[mask],
+            self.mutual_ratio[mask],
+        )
+
 
 def to_matches(table: pa.Table, n_segments: int) -> list[StoredMatches]:
-    """Unpack the matches of a song, one record a segment, empty for a segment without."""
+    """Unpack the matches of a song, one record a segment, empty for a segment without.
+
+    Parameters
+    ----------
+    table : ``match`` of one song
+    n_segments : int, >= 0
+
+    Returns
+    -------
+    n_segments records
+    """
     segment = to_numbers(table["segment_index"])
     found = []
     for index in range(n_segments):

@@ -112,7 +112,7 @@ def motion_beat(
     return Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose))
 
 
-@table_asset(MOTION_FEATURE, group="motion", code_version="1", settings="feature", partitions=SESSION)
+@table_asset(MOTION_FEATURE, group="motion", code_version="2", settings="feature", partitions=SESSION)
 def motion_feature(
     context: dg.AssetExecutionContext,
     canonical_pose: Stored,

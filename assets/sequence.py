@@ -1,6 +1,6 @@
 """From the matches of a song to its steps: pieces of clips, how they join, and the best sequence of them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,13 +99,28 @@ def load_matches(
     music_feature: Stored,
     motion_feature: Stored,
     motion_beat: Stored,
+    *,
+    may_dance: Container[str],
 ) -> LoadedMatches:
-    """Read a song's matches and the clips they name; where a segment has none, the longest clips as well."""
+    """Read a song's matches and the clips they name that may be danced; where there are none, the longest clips too.
+
+    Parameters
+    ----------
+    song_id : str
+    match, music_segment, music_feature : Stored, by song
+    motion_feature, motion_beat : Stored, by session
+    may_dance : clip_ids
+
+    Returns
+    -------
+    LoadedMatches
+    """
     segments = matching_tables.to_music_segment(music_segment.read(song_id))
-    matches = matching_tables.to_matches(match.read(song_id), len(segments.start_s))
+    every = matching_tables.to_matches(match.read(song_id), len(segments.start_s))
+    matches = [m.only([clip in may_dance for clip in m.clip_ids]) for m in every]
     wanted = {clip for m in matches for clip in m.clip_ids}
     if any(not m.clip_ids for m in matches):
-        wanted |= _longest(motion_feature)
+        wanted |= _longest(motion_feature, may_dance)
     clips: dict[str, ClipFeatures] = {}
     for key in motion_feature.keys:
         here = wanted & set(motion_feature.stamp(key).clips)
@@ -128,14 +143,31 @@ def load_matches(
     )
 
 
-def _longest(motion_feature: Stored, *, most: int = 20) -> set[str]:
+def _longest(motion_feature: Stored, may_dance: Container[str], *, most: int = 20) -> set[str]:
     sizes = {c: r.num_rows for key in motion_feature.keys for c, r in tables.by_clip(motion_feature.read(key)).items()}
-    names = sorted(sizes)
+    names = sorted(clip for clip in sizes if clip in may_dance)
     return {names[i] for i in longest_first(np.array([sizes[n] for n in names], np.int64), most=most)}
 
 
 def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, settings: Settings) -> Danced:
-    """Choose one piece a segment: by rhythm, intensity, pace, joints and repetition."""
+    """Choose one piece a segment: by rhythm, intensity, pace, joints and repetition.
+
+    Parameters
+    ----------
+    found : LoadedMatches
+    canonical_pose : Stored, poses of clips by session
+    beat_s : (B,) float, seconds, increasing, over the whole song
+    settings : Settings, of which ``match_path`` and ``dance`` are read
+
+    Returns
+    -------
+    Danced
+
+    Raises
+    ------
+    dg.Failure
+        If there is no clip longer than one frame.
+    """
     if not any(clip.duration_s > 0 for clip in found.clips.values()):
         raise dg.Failure("no clip can be danced: none is longer than one frame; add clips", allow_retries=False)
     spans, pieces = pieces_of(found, beat_s, settings.match_path)
@@ -213,6 +245,17 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
     """Pieces every span of the song may be danced with: (S + 1,) edges of the spans, and S lists.
 
     A segment without a match becomes as many spans as the longest clip needs, each with the longest clips' beginnings.
+
+    Parameters
+    ----------
+    found : LoadedMatches
+    beat_s : (B,) float, seconds, increasing
+    settings : MatchPathSettings
+
+    Returns
+    -------
+    edges : (S + 1,) float64, seconds
+    pieces : S lists, none empty
     """
     song_edges = intensity.quantile_edges(found.intensity)
     clip_edges = intensity.quantile_edges(
@@ -255,7 +298,19 @@ def _pairs(edges: Float) -> tuple[list[float], list[float]]:
 
 
 def places_of(matches: StoredMatches, part: Rhythm, clips: Mapping[str, ClipFeatures], *, most: int) -> list[Place]:
-    """List the matches of a segment and, in each one's clip, at most ``most`` other starts; with what each costs."""
+    """List the matches of a segment and, in each one's clip, at most ``most`` other starts; with what each costs.
+
+    Parameters
+    ----------
+    matches : StoredMatches of one segment
+    part : (L,) float32, its rhythm
+    clips : the clips these are in, by name
+    most : int, >= 0
+
+    Returns
+    -------
+    list of Place: the matches by rank, then the other starts by rank
+    """
     found = list(enumerate(matches.start_frame_index.tolist()))
     score, mutual = matches.score.tolist(), matches.mutual_ratio.tolist()
     for rank, start in enumerate(matches.start_frame_index.tolist()):
@@ -329,6 +384,15 @@ def match_cost(score: Float, mutual_ratio: Float) -> Float:
     """Cost of each place, 0 to 1: half for its rank among them, half for what lacks to an equal rhythm.
 
     Its rank is the share of the others with a better score, so equal scores cost the same.
+
+    Parameters
+    ----------
+    score : (N,) float, C of each place
+    mutual_ratio : (N,) float, 0 to 1
+
+    Returns
+    -------
+    (N,) float64, 0 to 1
     """
     better = np.searchsorted(np.sort(-score), -score)
     return np.asarray(0.5 * better / max(len(score) - 1, 1) + 0.5 * (1.0 - mutual_ratio), np.float64)
@@ -337,7 +401,21 @@ def match_cost(score: Float, mutual_ratio: Float) -> Float:
 def joints_of(
     pieces: Sequence[Sequence[Piece]], spans: Float, canonical_pose: Stored, *, blend_s: float, seam_weight: float
 ) -> tuple[connect.Thresholds, list[path.Joint]]:
-    """Compare the ends of all pieces with the starts of the next, and say which connect."""
+    """Compare the ends of all pieces with the starts of the next, and say which connect.
+
+    Parameters
+    ----------
+    pieces : S lists of pieces
+    spans : (S + 1,) float, seconds of the song
+    clips : features of the clips they are in, by name
+    canonical_pose : Stored, poses of clips by session
+    settings : Settings
+
+    Returns
+    -------
+    limits : Thresholds, measured in the clips of these pieces
+    joints : S - 1 Joint
+    """
     n_links = len(CANONICAL.joints) - 1
     weight = link_weights(CANONICAL.offset_xyz_m, CANONICAL.parent)
     half_s = blend_s / 2

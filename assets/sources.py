@@ -122,12 +122,14 @@ class Request:
     ----------
     frame_rate_hz : frames a second of the stage; 0 for the setting
     pins : as on the command line; beside those of the brief
+    character : clip or USD file whose body is danced with; "" for the brief's
     temperature : of a dance by the model; None for the setting
     seed : of what is drawn at random
     """
 
     frame_rate_hz: float = 0.0
     pins: tuple[str, ...] = ()
+    character: str = ""
     temperature: float | None = None
     seed: int = 0
 
@@ -386,10 +388,14 @@ def request_of(studio: Studio, key: str) -> Request:
 
 
 def request_version(studio: Studio, key: str, sources: Sources | None = None) -> str:
-    """Version of what was asked of a dance: by the command, and by the brief of its song, of known sources or now's."""
+    """Version of what was asked of a dance: by the command, and by the brief of its song, of known sources or now's.
+
+    Whose body it is danced with comes later: :func:`assets.characters.character_version`.
+    """
     brief = brief_of(studio, key.split("|")[0], sources)
     directed = {"pin": [pin.text for pin in brief.pin], "pins": brief.pins, "allow": sorted(brief.allow)}
-    return fingerprint([asdict(request_of(studio, key)), directed])
+    asked = {**asdict(request_of(studio, key)), "character": ""}
+    return fingerprint([asked, directed])
 
 
 def brief_of(studio: Studio, song: str, sources: Sources | None = None) -> Brief:

@@ -9,11 +9,14 @@ import dagster as dg
 import numpy as np
 import polars as pl
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from assets import licences, tables
+from assets.characters import Cast, CharacterError, character_of, character_version, dress, read_clip, read_file
 from assets.declare import table_asset
 from assets.formats import audio, midi
 from assets.formats.audio import Audio
+from assets.formats.usd_character import is_file
 from assets.lineage import Progress, Stored
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.sources import Studio
@@ -30,7 +33,8 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 class Stage:
     """A dance ready to be written: its motion, its song, what it was made from, how good it is.
 
-    ``lineage`` has a value a frame by the names of :data:`schemas.usd.LINEAGE`.
+    ``lineage`` has a value a frame by the names of :data:`schemas.usd.LINEAGE`; ``cast`` is the character it is danced
+    by, None for odori's own body; ``asked`` the version of that wish.
     """
 
     song_id: str
@@ -40,14 +44,17 @@ class Stage:
     provenance: Mapping[str, Any]
     quality: Mapping[str, Any]
     lineage: Mapping[str, Any]
+    cast: Cast | None = None
+    asked: str = ""
 
 
 @table_asset(
     USD_ANIMATION,
     group="dance",
     code_version="2",
+    sources="character",
     partitions=DANCE,
-    ins={"clip": _EVERY_CLIP},
+    ins={name: _EVERY_CLIP for name in ("clip", "skeleton", "pose")},
     io_manager="stage",
 )
 def usd_animation(
@@ -58,12 +65,15 @@ def usd_animation(
     dance_quality: pa.Table,
     song: pa.Table,
     clip: Stored,
+    skeleton: Stored,
+    pose: Stored,
     studio: dg.ResourceParam[Studio],
     progress: dg.ResourceParam[Progress],
 ) -> Stage:
     """Write the dance as USD, alone and packed with its song."""
     progress.begin("writing the stage", 1)
-    song_id, method = lake_key(context.partition_key).split("|")
+    key = lake_key(context.partition_key)
+    song_id, method = key.split("|")
     played = next(row for row in song.to_pylist() if row["state"] == "read")
     steps = tables.to_choreography(choreography)
     moved = Clip(
@@ -72,17 +82,50 @@ def usd_animation(
         tables.to_array(dance_pose["root_xyz_m"]),
         tables.to_array(dance_pose["rotation_wxyz"]),
     )
+    provenance = _provenance(played, method, steps, clip)
+    refuse_changed(frame_lineage, {row["clip_id"]: row["licence"] for row in provenance["clips"]})
+    cast = _cast(character_of(studio, key), studio, skeleton, pose)
+    if cast is not None:
+        moved, provenance["character"] = dress(moved, cast)
     stage = Stage(
         song_id,
         method,
         moved,
         _sound(played, studio),
-        _provenance(played, method, steps, clip),
+        provenance,
         _quality(dance_quality),
         lineage_of(frame_lineage, choreography),
+        cast,
+        character_version(studio, key),
     )
     progress.step()
     return stage
+
+
+def refuse_changed(frames: pa.Table, licence_of: Mapping[str, str]) -> None:
+    """Raise dg.Failure where a clip that may not be changed is blended with another: a promise to its author.
+
+    Methods of dancing keep such clips out of their seams; this is the last look before anything leaves the studio.
+    """
+    whole = {clip for clip, name in licence_of.items() if not licences.may_be_joined(name)}
+    blended = frames.filter(pc.is_valid(frames["blend_clip_id"]))
+    touched = sorted(whole & {*blended["clip_id"].to_pylist(), *blended["blend_clip_id"].to_pylist()})
+    if touched:
+        raise dg.Failure(
+            f"want clips whose licence forbids changes left whole, got {', '.join(touched)} in a blend; leave them out "
+            "with 'allow' in the brief",
+            allow_retries=False,
+        )
+
+
+def _cast(text: str, studio: Studio, skeleton: Stored, pose: Stored) -> Cast | None:
+    """Find the character a dance is asked for with; None for odori's own body."""
+    try:
+        if not text:
+            return None
+        return read_file(studio, text) if is_file(text) else read_clip(text, skeleton, pose)
+    except CharacterError as error:
+        raise dg.Failure(f"character: {error}", allow_retries=False) from error
 
 
 def _sound(song: Mapping[str, Any], studio: Studio) -> Audio:

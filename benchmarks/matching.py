@@ -6,7 +6,8 @@
 CPU-seconds of the process, all threads, the least of the repeats (on a GPU, wall seconds). *Brute* is the tuned OpenCL
 search of everything, timed on a part of the segments and scaled; *Numba* a search of everything in Numba; *zero-skip*
 leaves out silent frames of each segment. *Query* is the pruned search with its index there, the whole call, its plan
-picked before by trial; *index* is the upload and all tables of that plan.
+picked before by trial; *index* is the upload and all tables of that plan; its
+rate counts what summing every row from frames would interpolate, though large blocks are summed from small ones.
 
 Clips: *energy*, mean joint speed of the real dances and labelled takes where there are some (in ODORI_TEST_DATA, else
 beside the checkout), cut, stretched in time by up to a fifth and scaled to the number wanted, else of the made-up
@@ -35,7 +36,8 @@ import pyopencl as cl
 from scipy.ndimage import gaussian_filter1d
 
 from assets.formats import bvh
-from kernels.matching.plan import BRUTE, BRUTE_SPARSE, Plan, bytes_a_frame
+from kernels.matching.blocks import rows
+from kernels.matching.plan import BRUTE, BRUTE_SPARSE, Plan, built, bytes_a_frame
 from kernels.matching.score import SCALE_NUMERATORS, reference_matches, start_count
 from kernels.opencl.device import pick_device
 from kernels.opencl.match import ClipIndex, Matcher
@@ -137,6 +139,21 @@ def n_terms(segments: list[Series], clips: list[Series]) -> int:
     return sum(len(segment) * per_length[len(segment)] for segment in segments)
 
 
+def n_lerps(plan: Plan, clips: list[Series]) -> int:
+    """Frames that the tables of a plan are sums of: what summing every row from frames would interpolate."""
+    each = sum(len(rows(g, SCALE_NUMERATORS)) * g for g in built(plan))
+    return each * sum(len(clip) for clip in clips)
+
+
+def resident_mb() -> float:
+    """Memory of this process that is really there; 0 where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
 class Clock:
     """CPU-seconds where the device is the CPU, else wall seconds; the least of some repeats."""
 
@@ -221,6 +238,7 @@ def measure_kind(program: Program, segments: list[Series], clips: list[Series], 
         "query_cpu_s": query_s,
         "query_wall_s": wall_s,
         "index_cpu_s": index_s,
+        "index_glerp_per_cpu_s": n_lerps(plan, clips) / 1e9 / index_s,
         "first_query_with_trials_cpu_s": first_s,
         "brute_cpu_s": brute_s,
         "zero_skip_cpu_s": zero_skip_s,
@@ -256,27 +274,32 @@ def measure_brute(program: Program, segments: list[Series], clips: list[Series],
 
 def measure_growth(program: Program, sources: list[NDArray[np.float64]], clock: Clock, counts: list[int]) -> list[dict]:
     """Query, index and memory of growing catalogues, 32 segments."""
-    rows = []
+    figures = []
     segments, clips = make("energy", 32, max(counts), sources)
     plan = Plan((25, 8), (10, 8), (10, 5))
     for n in counts:
+        before_mb = resident_mb()
+        tables = Tables(program, clips[:n], numerators=SCALE_NUMERATORS)
+        tables.build(plan)
+        measured_mb, allocated_mb = resident_mb() - before_mb, tables.n_bytes / 1e6
+        del tables
+        index_s = clock(lambda n=n: Tables(program, clips[:n], numerators=SCALE_NUMERATORS).build(plan), repeats=1)
         matcher = Matcher(program=program, plan=plan)
         index = matcher.index(clips[:n])
         matcher.matches(segments, index, k=K)
         query_s = clock(lambda m=matcher, i=index: m.matches(segments, i, k=K))
         frames = sum(len(clip) for clip in clips[:n])
-        rows.append(
+        figures.append(
             {
                 "clips": n,
                 "query_cpu_s": query_s,
-                "index_cpu_s": clock(
-                    lambda n=n: Tables(program, clips[:n], numerators=SCALE_NUMERATORS).build(plan), repeats=1
-                ),
-                "memory_formula_mb": frames * bytes_a_frame(plan, SCALE_NUMERATORS) / 1e6,
-                "memory_allocated_mb": index.device_bytes / 1e6,
+                "index_cpu_s": index_s,
+                "memory_formula_mb": (frames * bytes_a_frame(plan, SCALE_NUMERATORS) + 8 * len(segments) * n) / 1e6,
+                "memory_allocated_mb": allocated_mb,
+                "memory_measured_mb": measured_mb,
             }
         )
-    return rows
+    return figures
 
 
 def main() -> None:
@@ -328,7 +351,11 @@ def show(figures: dict) -> None:
         for row in figures["growth"]:
             print("".join(f"{value:>22.4g}" for value in row.values()))
         per_clip = figures["growth"][-1]["query_cpu_s"] / figures["growth"][-1]["clips"]
-        print(f"extrapolated to 50000 clips, 32 segments (not run): {per_clip * 50000:.1f} CPU-s a query")
+        per_clip_mb = figures["growth"][-1]["memory_formula_mb"] / figures["growth"][-1]["clips"]
+        print(
+            f"extrapolated to 50000 such clips, 32 segments (not run): {per_clip * 50000:.1f} CPU-s a query, tables of "
+            f"{per_clip_mb * 50:.1f} GB, taken chunk by chunk"
+        )
 
 
 if __name__ == "__main__":

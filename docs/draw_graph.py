@@ -16,7 +16,7 @@ COLOUR = {
     "search": "#e3f0f0",
     "dance": "#f9dede",
 }
-SOURCES = {"clips": "clips/**", "song": "songs/*", "request": "what was asked"}
+SOURCES = {"clips": "clips/**", "song": "songs/*", "request": "what was asked", "character": "character"}
 # Columns by how far an asset is from the files; rows so that lines seldom cross.
 PLACES = {
     "clips": (0, 1),

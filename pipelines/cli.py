@@ -89,6 +89,9 @@ def dance(
     alternatives: Annotated[
         int, typer.Option("--alternatives", help="How many different dances of each song to make.")
     ] = 1,
+    character: Annotated[
+        str, typer.Option("--character", metavar="CLIP|FILE.usd", help="Whose body dances; else as the brief says.")
+    ] = "",
     propose: Annotated[
         str | None,
         typer.Option("--propose", metavar="PLACE", help="Only list what could be pinned there, with its cost."),
@@ -106,6 +109,7 @@ def dance(
     odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY ·
     odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3 ·
     odori dance waltz --propose 42 · odori dance waltz --pin 12=spin --propose bar:9-10 ·
+    odori dance waltz --character hero.usdz · odori dance waltz --character ayame-step_01 ·
     odori dance groove.mid --method hmm --temperature 0.5 --seed 2
     """
     if propose is not None:
@@ -119,6 +123,7 @@ def dance(
         as_json,
         pins=pin or (),
         alternatives=alternatives,
+        character=character,
         temperature=temperature,
         seed=seed,
     )

@@ -14,7 +14,7 @@ from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES, base_met
 from assets.sources import Request, Song
 from kernels.skeleton.canonical import JOINTS
 from pipelines import build as building
-from pipelines import dancing, proposing
+from pipelines import casting, dancing, proposing
 from pipelines import why as explaining
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
@@ -135,6 +135,7 @@ def dance(
     progress: Callable[[], Any],
     pins: Sequence[str] = (),
     alternatives: int = 1,
+    character: str = "",
     temperature: float | None = None,
     seed: int = 0,
 ) -> Outcome:
@@ -149,13 +150,14 @@ def dance(
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
     work = Session(studio, progress)
     songs = _wanted(work.state, wanted, studio)
+    character = casting.named(studio, work.state.sources, character)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
     methods = {song.key: _ways(method or _briefed_method(studio, song), alternatives) for song in songs}
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
     before = studio.requests()
     for key in sorted(keys):
-        studio.remember(key, Request(frame_rate_hz or 0.0, pins, temperature, seed))
+        studio.remember(key, Request(frame_rate_hz or 0.0, pins, character, temperature, seed))
     names = {song.key for song in songs}
     if any(base_method(chosen) == "hmm" for ways in methods.values() for chosen in ways):
         names |= work.state.sources.performed_songs  # what the dancer danced to is what the model learns from

@@ -43,6 +43,7 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
         "cost": sum(costs.values()),
         "costs": costs,
         "clips": steps["clip_id"].unique(maintain_order=True).to_list(),
+        "character": report["provenance"].get("character"),
         "pins": _pin_facts(studio, song, method, steps),
     }
     if alternative_number(method) > 1:
@@ -128,6 +129,12 @@ def report_of(facts: dict[str, Any]) -> str:
         lines.append(
             f"  against the best dance: {facts['same_ratio']:.0%} of the time the same, {facts['shared_ratio']:.0%} of "
             f"its motion shown there too, {len(facts['shared_clips'])} of {len(facts['clips'])} clips shared"
+        )
+    if facts["character"]:
+        body = facts["character"]
+        lines.append(
+            f"  danced by {body.get('clip_id') or body['file']}, {body['scale_ratio']:.2f} of our legs: feet slide "
+            f"{body['foot_slide_cm_per_s']:.1f} cm/s, {body['penetration_cm']:.1f} cm below the floor at most"
         )
     lines.append(f"  licence {facts['licence']['name']}: {facts['licence']['sentence']}")
     lines += [

@@ -14,6 +14,7 @@ from typing import Literal
 import dagster as dg
 
 from assets import sources as source_kinds
+from assets.characters import character_version
 from assets.declare import KEEPS_KEY, METHODS_KEY, ONLY_FOR_KEY, SETTINGS_KEY, SOURCES_KEY
 from assets.lineage import Stamp, version_of
 from assets.partitions import ALTERNATIVES, METHODS, base_method
@@ -223,6 +224,8 @@ class Freshness:
             return version_of(source_kinds.song_version(songs), brief)
         if kind == "request":
             return source_kinds.request_version(self._studio, key, self.sources)
+        if kind == "character":
+            return character_version(self._studio, key, self.sources)
         return ""
 
     def inputs(self, asset: str, key: str) -> dict[str, str] | None:

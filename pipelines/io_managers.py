@@ -5,6 +5,7 @@ Assets return tables or records, never paths; only this module and the lake know
 
 import dataclasses
 import json
+import shutil
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import dagster as dg
 import pyarrow as pa
 
 from assets import tables
-from assets.formats import audio, motion_index, tree, usd, usd_package
+from assets.formats import audio, motion_index, tree, usd, usd_cast, usd_package
 from assets.lineage import Part, Parts, Stamp, content_version
 from assets.partitions import dagster_key, lake_key
 from assets.search import Index
@@ -169,7 +170,8 @@ class StageIOManager(LakeIOManager):
             }
             for path in written
         ]
-        super().handle_output(context, tables.from_rows(USD_ANIMATION, rows))
+        key = f"{obj.song_id}|{obj.method}"
+        super().handle_output(context, Part(key, tables.from_rows(USD_ANIMATION, rows), obj.asked))
 
 
 def write_dance(folder: Path, stage: Stage) -> list[Path]:
@@ -177,14 +179,17 @@ def write_dance(folder: Path, stage: Stage) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     sound, usdc, usdz = folder / "song.wav", folder / f"{stage.method}.usdc", folder / f"{stage.method}.usdz"
     audio.write_wav(sound, stage.sound)
-    usd.write_stage(
-        usdc,
-        stage.clip,
-        audio=sound.name,
-        provenance=stage.provenance,
-        title=f"{stage.song_id}, {stage.method}",
-        lineage=stage.lineage,
-    )
+    told: dict[str, Any] = {
+        "audio": sound.name,
+        "provenance": stage.provenance,
+        "title": f"{stage.song_id}, {stage.method}",
+        "lineage": stage.lineage,
+    }
+    if stage.cast is not None and stage.cast.rig is not None and stage.cast.copy is not None:
+        usd_cast.write_cast_stage(usdc, stage.clip, stage.cast.rig, stage.cast.copy, **told)
+    else:
+        usd.write_stage(usdc, stage.clip, **told)
+        shutil.rmtree(usd_cast.character_folder(usdc), ignore_errors=True)  # of a dance by somebody else
     usd_package.write_package(usdz, usdc)
     report = {
         "song": stage.song_id,

@@ -83,8 +83,17 @@ class StudioFolder:
     def lost_stages(self, song: str, method: str) -> list[str]:
         """Names of a finished dance's files that are not there any more."""
         folder = self.dances / song
-        names = ("song.wav", f"{method}.usdc", f"{method}.usdz", f"{method}.json")
+        names = ("song.wav", f"{method}.usdc", f"{method}.usdz", f"{method}.json", *self._cast_files(folder, method))
         return [name for name in names if not (folder / name).is_file()]
+
+    @staticmethod
+    def _cast_files(folder: Path, method: str) -> list[str]:
+        """Names of what a dance by a character of another file consists of besides."""
+        try:
+            told = json.loads((folder / f"{method}.json").read_text())
+            return [f"{method}_character/character.usdc"] if "file" in told["provenance"].get("character", {}) else []
+        except (OSError, ValueError, KeyError, AttributeError):
+            return []
 
     @property
     def dagster_home(self) -> Path:

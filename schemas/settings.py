@@ -283,4 +283,5 @@ class Brief(_Checked):
     pin: tuple[PinWish, ...] = key((), "What is to be danced when: one [[pin]] each, a place and a wish.")
     pins: str = key("hard", "'hard': kept or refused; 'soft': a price where not kept.", values=("hard", "soft"))
     allow: tuple[str, ...] = key((), "Licences of the clips that may be danced; empty for all.")
+    character: str = key("", "Whose body is danced with: a clip's key, or a rigged USD file beside the songs.")
     beats: BeatsBrief = field(default_factory=BeatsBrief)

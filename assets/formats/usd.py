@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -78,14 +78,14 @@ def write_stage(
 
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
-    _write_metadata(stage, clip)
+    write_metadata(stage, clip)
     _write_root(stage, clip, provenance or {}, title)
     _write_skeleton(stage, clip.skeleton)
     shape = body(clip.skeleton)
     _write_body(stage, shape)
     _write_extent(stage, clip, shape)
     if audio is not None:
-        _write_audio(stage, audio)
+        write_audio(stage, audio)
     if lineage is not None and any(len(values) != clip.n_frames for values in lineage.values()):
         raise ValueError(f"lineage: want a value a frame, {clip.n_frames}, got {[len(v) for v in lineage.values()]}")
     with Sdf.ChangeBlock():
@@ -135,30 +135,53 @@ def write_animation(layer: Sdf.Layer, clip: Clip) -> None:
             f"rotation_wxyz: want unit quaternions, got length {length[f, j]:.6g} at frame {f}, "
             f"joint {clip.skeleton.joints[j]}; normalise them"
         )
-    prim = Sdf.CreatePrimInLayer(layer, contract.ANIMATION_PATH)
+    unit = rotation.continuous(clip.rotation_wxyz / length[..., None])
+    if clip.translation_xyz_m is None:
+        translation = np.repeat(clip.skeleton.offset_xyz_m[None], clip.n_frames, axis=0)
+    else:
+        translation = clip.translation_xyz_m.copy()
+    translation[:, 0] = clip.root_xyz_m
+    write_samples(layer, contract.ANIMATION_PATH, joint_paths(clip.skeleton), unit, translation)
+
+
+def write_samples(
+    layer: Sdf.Layer,
+    path: str,
+    joint_names: Sequence[str],
+    rotation_wxyz: Float,
+    translation: Float,
+    scale: Float | None = None,
+) -> None:
+    """Write a SkelAnimation, a sample a time code from the first on; call it inside a change block.
+
+    Parameters
+    ----------
+    layer : Sdf.Layer
+    path : of the SkelAnimation
+    joint_names : J joint paths
+    rotation_wxyz : (F, J, 4) float, unit, local, in one hemisphere from frame to frame
+    translation : (F, J, 3) float, local, in the skeleton's unit
+    scale : (J,) float, or None for 1
+    """
+    prim = Sdf.CreatePrimInLayer(layer, path)
     prim.specifier, prim.typeName = Sdf.SpecifierDef, "SkelAnimation"
     joints = Sdf.AttributeSpec(prim, "joints", Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
-    joints.default = Vt.TokenArray(joint_paths(clip.skeleton))
+    joints.default = Vt.TokenArray(list(joint_names))
     scales = Sdf.AttributeSpec(prim, "scales", Sdf.ValueTypeNames.Half3Array)
-    scales.default = Vt.Vec3hArray([Gf.Vec3h(1, 1, 1)] * len(clip.skeleton.joints))
-
-    unit = rotation.continuous(clip.rotation_wxyz / length[..., None])
-    imaginary_first = np.ascontiguousarray(np.roll(unit, -1, axis=-1), np.float32)
-    if clip.translation_xyz_m is None:
-        translation = np.repeat(clip.skeleton.offset_xyz_m[None].astype(np.float32), clip.n_frames, axis=0)
-    else:
-        translation = clip.translation_xyz_m.astype(np.float32)
-    translation[:, 0] = clip.root_xyz_m
+    each = np.ones(len(joint_names)) if scale is None else scale
+    scales.default = Vt.Vec3hArray([Gf.Vec3h(s, s, s) for s in each.tolist()])
+    imaginary_first = np.ascontiguousarray(np.roll(rotation_wxyz, -1, axis=-1), np.float32)
+    place = np.ascontiguousarray(translation, np.float32)
     rotations = Sdf.AttributeSpec(prim, "rotations", Sdf.ValueTypeNames.QuatfArray).path
     translations = Sdf.AttributeSpec(prim, "translations", Sdf.ValueTypeNames.Float3Array).path
-    for frame in range(clip.n_frames):
+    for frame in range(len(place)):
         time = contract.START_TIME_CODE + frame
         layer.SetTimeSample(rotations, time, Vt.QuatfArray.FromNumpy(imaginary_first[frame]))
-        layer.SetTimeSample(translations, time, Vt.Vec3fArray.FromNumpy(translation[frame]))
+        layer.SetTimeSample(translations, time, Vt.Vec3fArray.FromNumpy(place[frame]))
 
 
-def _write_metadata(stage: Usd.Stage, clip: Clip) -> None:
-    """Axis, unit, rate and range."""
+def write_metadata(stage: Usd.Stage, clip: Clip) -> None:
+    """Write axis, unit, rate and range."""
     UsdGeom.SetStageUpAxis(stage, contract.UP_AXIS)
     UsdGeom.SetStageMetersPerUnit(stage, contract.METERS_PER_UNIT)
     stage.SetTimeCodesPerSecond(clip.frame_rate_hz)
@@ -170,10 +193,15 @@ def _write_metadata(stage: Usd.Stage, clip: Clip) -> None:
 def _write_root(stage: Usd.Stage, clip: Clip, provenance: Mapping[str, object], title: str) -> None:
     """Define the default prim: a SkelRoot that tells where the dance came from."""
     prim = UsdSkel.Root.Define(stage, contract.ROOT_PATH).GetPrim()
+    UsdSkel.BindingAPI.Apply(prim)
+    tell_root(stage, prim, provenance, title)
+
+
+def tell_root(stage: Usd.Stage, prim: Usd.Prim, provenance: Mapping[str, object], title: str) -> None:
+    """Make a prim the one a stage is about, and write down where the dance came from."""
     stage.SetDefaultPrim(prim)
     Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
     Usd.ModelAPI(prim).SetAssetName(title)
-    UsdSkel.BindingAPI.Apply(prim)
     if provenance:
         prim.SetCustomDataByKey(contract.PROVENANCE_KEY, _to_usd(provenance, "provenance"))
 
@@ -254,7 +282,7 @@ def _write_extent(stage: Usd.Stage, clip: Clip, shape: Body) -> None:
     )
 
 
-def _write_audio(stage: Usd.Stage, audio: str) -> None:
+def write_audio(stage: Usd.Stage, audio: str) -> None:
     """Define the song. It starts with the stage: no startTime, since one importer refuses it."""
     relative = PurePosixPath(audio)
     if usd_read.is_absolute(audio) or relative.suffix.lower() != contract.PACKAGE_AUDIO_SUFFIX:

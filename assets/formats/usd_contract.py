@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Ar, Usd, UsdGeom, UsdMedia, UsdSkel
 
 from assets.formats import usd_lineage, usd_read
-from kernels.skeleton.canonical import JOINTS
+from kernels.skeleton.canonical import JOINTS, REQUIRED_JOINTS
 from kernels.types import Float
 from schemas import usd as contract
 
@@ -61,7 +62,7 @@ def _stage(stage: Usd.Stage) -> Iterator[Finding]:
 def _root(stage: Usd.Stage) -> Iterator[Finding]:
     """Ask for a SkelRoot to start from."""
     prim = stage.GetDefaultPrim()
-    if not prim or not prim.IsA(UsdSkel.Root):
+    if not prim or not (prim.IsA(UsdSkel.Root) or _cast(stage)):
         got = f"a {prim.GetTypeName() or 'prim without type'} at {prim.GetPath()}" if prim else "none"
         yield _error("default-prim", str(prim.GetPath()) if prim else "", f"defaultPrim: want a SkelRoot, got {got}")
     root = _skel_root(stage)
@@ -70,9 +71,10 @@ def _root(stage: Usd.Stage) -> Iterator[Finding]:
         return
     if not root.HasAPI(UsdSkel.BindingAPI):
         yield _error("binding-api", str(root.GetPath()), "SkelBindingAPI: want it applied to the SkelRoot, got it not")
-    if Usd.ModelAPI(root).GetKind() != "component":
-        got = Usd.ModelAPI(root).GetKind() or "nothing"
-        yield _warning("kind", str(root.GetPath()), f"kind: want component, got {got}")
+    whole = prim if _cast(stage) else root
+    if Usd.ModelAPI(whole).GetKind() != "component":
+        got = Usd.ModelAPI(whole).GetKind() or "nothing"
+        yield _warning("kind", str(whole.GetPath()), f"kind: want component, got {got}")
     if not UsdGeom.Boundable(root).GetExtentAttr().HasAuthoredValue():
         yield _warning("extent", str(root.GetPath()), "extent: want one over the whole dance, got none")
 
@@ -83,6 +85,8 @@ def _skeleton(stage: Usd.Stage) -> Iterator[Finding]:
     if root is None:
         return
     skeletons = [prim for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Skeleton)]
+    if _cast(stage):
+        skeletons = [prim for prim in skeletons if str(prim.GetPath()) == _cast(stage)["skeleton"]]
     if len(skeletons) != 1:
         yield _error("skeleton", str(root.GetPath()), f"Skeleton: want one under the SkelRoot, got {len(skeletons)}")
     if not skeletons:
@@ -90,14 +94,32 @@ def _skeleton(stage: Usd.Stage) -> Iterator[Finding]:
     skeleton, where = UsdSkel.Skeleton(skeletons[0]), str(skeletons[0].GetPath())
     joints = [str(joint) for joint in skeleton.GetJointsAttr().Get() or ()]
     leaves = [joint.rsplit("/")[-1] for joint in joints]
+    cast = _cast(stage)
     missing = [joint for joint in JOINTS if joint not in leaves]
-    if missing:
+    if cast:
+        missing = sorted(name for name in REQUIRED_JOINTS if cast["joints"].get(name) not in joints)
+        if missing:
+            yield _error("joints", where, f"joints: want the character's own of each part, got no {', '.join(missing)}")
+    elif missing:
         got = f"{len(joints)} joints and none of those" if len(missing) == len(JOINTS) else f"no {', '.join(missing)}"
         yield _error("joints", where, f"joints: want the {len(JOINTS)} VRM names, got {got}")
     is_ordered, why = UsdSkel.Topology(joints).Validate()
     if not is_ordered:
         yield _error("joints", where, f"joints: want parents before children, got: {why}")
         return
+    if not cast:  # rest and bind pose of a character are its file's own
+        yield from _rest(stage, skeleton, joints, where)
+    if not skeletons[0].HasAPI(UsdSkel.BindingAPI):
+        yield _error(
+            "binding-api", where, "SkelBindingAPI: want it applied to the Skeleton, got it not; no reader animates"
+        )
+    source = _animation_prim(stage)
+    if source is None:
+        yield _error("animation", where, "skel:animationSource: want a SkelAnimation, got none bound")
+
+
+def _rest(stage: Usd.Stage, skeleton: UsdSkel.Skeleton, joints: list[str], where: str) -> Iterator[Finding]:
+    """Ask for a rest pose that is the bind pose, and turns and moves joints only."""
     rest = _matrices(skeleton.GetRestTransformsAttr())
     bind = _matrices(skeleton.GetBindTransformsAttr())
     for name, matrix in (("restTransforms", rest), ("bindTransforms", bind)):
@@ -110,13 +132,6 @@ def _skeleton(stage: Usd.Stage) -> Iterator[Finding]:
     apart_m = float(np.abs(world - bind).max(initial=0.0)) * UsdGeom.GetStageMetersPerUnit(stage)
     if apart_m > _PLACE_ATOL_M:
         yield _warning("bind", where, f"bindTransforms: want the rest pose in the world, got one {apart_m:.2g} apart")
-    if not skeletons[0].HasAPI(UsdSkel.BindingAPI):
-        yield _error(
-            "binding-api", where, "SkelBindingAPI: want it applied to the Skeleton, got it not; no reader animates"
-        )
-    source = _animation_prim(stage)
-    if source is None:
-        yield _error("animation", where, "skel:animationSource: want a SkelAnimation, got none bound")
 
 
 def _animation(stage: Usd.Stage) -> Iterator[Finding]:
@@ -126,8 +141,8 @@ def _animation(stage: Usd.Stage) -> Iterator[Finding]:
         return
     animation, where = UsdSkel.Animation(prim), str(prim.GetPath())
     joints = list(animation.GetJointsAttr().Get() or ())
-    skeleton = next(UsdSkel.Skeleton(prim) for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Skeleton))
-    if joints != list(skeleton.GetJointsAttr().Get() or ()):
+    skeleton = _skeleton_prim(stage)
+    if skeleton is None or joints != list(UsdSkel.Skeleton(skeleton).GetJointsAttr().Get() or ()):
         yield _error(
             "joint-order", where, "joints: want those of the Skeleton in its order, got others or another order"
         )
@@ -148,7 +163,7 @@ def _animation(stage: Usd.Stage) -> Iterator[Finding]:
         elif width == 4:
             yield from _rotations(stacked, joints, where)
     scales = np.array(animation.GetScalesAttr().Get(), np.float64)
-    if scales.shape != (len(joints), 3) or not (scales == 1).all():
+    if scales.shape != (len(joints), 3) or not (_cast(stage) or (scales == 1).all()):
         yield _warning("scales", where, f"scales: want 1 for every joint, got {_shape(scales)}")
 
 
@@ -166,7 +181,12 @@ def _rotations(quaternion: Float, joints: list[str], where: str) -> Iterator[Fin
 
 
 def _body(stage: Usd.Stage) -> Iterator[Finding]:
-    """Ask for a mesh that follows the skeleton."""
+    """Ask for a mesh that follows the skeleton; what a character's own file lacks is a warning."""
+    for finding in _meshes(stage):
+        yield replace(finding, severity="warning") if _cast(stage) else finding
+
+
+def _meshes(stage: Usd.Stage) -> Iterator[Finding]:
     root = _skel_root(stage)
     if root is None:
         return
@@ -262,7 +282,7 @@ def _provenance(stage: Usd.Stage) -> Iterator[Finding]:
 
 
 def _lineage(stage: Usd.Stage) -> Iterator[Finding]:
-    """Ask where each frame comes from: none at all is a warning, half of it an error."""
+    """Ask where each frame comes from: none at all in a dance of clips is a warning, half of it an error."""
     prim, root = _animation_prim(stage), stage.GetDefaultPrim()
     if prim is None or not stage.GetEndTimeCode() >= stage.GetStartTimeCode():
         return
@@ -273,6 +293,8 @@ def _lineage(stage: Usd.Stage) -> Iterator[Finding]:
     except (ValueError, KeyError, TypeError):
         clips = None
     is_there = any(prim.GetAttribute(name) for name in contract.LINEAGE)
+    if not is_there and told is None:  # made of no clips: there is nothing to ask for
+        return
     span = np.arange(stage.GetStartTimeCode(), stage.GetEndTimeCode() + 1)
     say = _error if is_there else _warning
     for sentence in usd_lineage.troubles(prim, span, clips) if is_there else ["odori:clip: want lineage, got none"]:
@@ -292,21 +314,40 @@ def _texts(value: object, name: str) -> Iterator[tuple[str, str]]:
 
 
 def _skel_root(stage: Usd.Stage) -> Usd.Prim | None:
-    """Find the default prim if it is a SkelRoot, else the first SkelRoot."""
-    prim = stage.GetDefaultPrim()
+    """Find the character's, the default prim if it is a SkelRoot, else the first SkelRoot."""
+    cast, prim = _cast(stage), stage.GetDefaultPrim()
+    if cast and stage.GetPrimAtPath(cast["skel_root"]):
+        prim = stage.GetPrimAtPath(cast["skel_root"])
     if prim and prim.IsA(UsdSkel.Root):
         return prim
     return next((prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Root)), None)
 
 
+def _cast(stage: Usd.Stage) -> dict[str, Any]:
+    """Read what the provenance says of a character from another file; {} where the body is odori's own."""
+    prim = stage.GetDefaultPrim()
+    stored = prim.GetCustomDataByKey(f"{contract.PROVENANCE_KEY}:character") if prim else None
+    is_whole = isinstance(stored, dict) and all(
+        isinstance(stored.get(key), kind) for key, kind in (("skel_root", str), ("skeleton", str), ("joints", dict))
+    )
+    if stored is None or not is_whole:
+        return {}
+    below = {key: f"{contract.ROOT_PATH}/{stored[key]}".rstrip("/") for key in ("skel_root", "skeleton")}
+    return {**stored, **below}
+
+
+def _skeleton_prim(stage: Usd.Stage) -> Usd.Prim | None:
+    """Find the character's Skeleton, else the first under the SkelRoot."""
+    root, cast = _skel_root(stage), _cast(stage)
+    found = [prim for prim in Usd.PrimRange(root) if prim.IsA(UsdSkel.Skeleton)] if root else []
+    return next((prim for prim in found if str(prim.GetPath()) == cast.get("skeleton")), found[0] if found else None)
+
+
 def _animation_prim(stage: Usd.Stage) -> Usd.Prim | None:
-    """Find the SkelAnimation bound to the first Skeleton."""
-    root = _skel_root(stage)
-    for prim in Usd.PrimRange(root) if root else ():
-        if prim.IsA(UsdSkel.Skeleton):
-            source = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource()
-            return source if source and source.IsA(UsdSkel.Animation) else None
-    return None
+    """Find the SkelAnimation bound to that Skeleton."""
+    prim = _skeleton_prim(stage)
+    source = UsdSkel.BindingAPI(prim).GetInheritedAnimationSource() if prim else None
+    return source if source and source.IsA(UsdSkel.Animation) else None
 
 
 def _error(rule: str, prim_path: str, sentence: str) -> Finding:

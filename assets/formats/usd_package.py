@@ -15,6 +15,7 @@ from pxr import Sdf
 
 from assets.formats import usd, usd_read
 from assets.formats.errors import FormatError
+from assets.formats.usd_cast import character_folder
 from schemas import usd as contract
 
 _ZIP_HEADER_BYTES = 30
@@ -48,6 +49,7 @@ def write_package(path: str | Path, stage: str | Path) -> None:
         name = re.sub(r"[^A-Za-z0-9._-]", "_", source.name)
         song.default = Sdf.AssetPath("./" + name)
         members.append((name, _read_wave(source)))
+    members += [(name, file.read_bytes()) for name, file in _character_files(layer, stage).items()]
     with usd.written_beside(path) as partial:
         scratch = partial.with_suffix(".usdc")
         try:
@@ -82,6 +84,11 @@ def copy_stage(path: str | Path, stage: str | Path) -> None:
         with usd.written_beside(sound) as partial:
             partial.write_bytes(data)
         song.default = Sdf.AssetPath("./" + sound.name)
+    for name, file in _character_files(layer, stage).items():
+        own = character_folder(path).name + name[name.index("/") :]
+        with usd.written_beside(path.parent / own) as partial:
+            partial.write_bytes(file.read_bytes())
+        layer.UpdateCompositionAssetDependency(f"./{name}", f"./{own}")
     with usd.written_beside(path) as partial:
         usd.save(layer, partial)
 
@@ -99,6 +106,14 @@ def song_name(stage: str | Path) -> str | None:
         return None
     song = layer.GetAttributeAtPath(contract.AUDIO_PATH + ".filePath")
     return None if song is None else Path(song.default.path).name
+
+
+def _character_files(layer: Sdf.Layer, stage: Path) -> dict[str, Path]:
+    """Files of the character a stage references, by path relative to it; none where it has a body of its own."""
+    referenced = [Path(name) for name in layer.GetCompositionAssetDependencies()]
+    folders = {stage.parent / name.parent for name in referenced if name.parent.name == character_folder(stage).name}
+    files = sorted(file for folder in folders for file in folder.rglob("*") if file.is_file())
+    return {file.relative_to(stage.parent).as_posix(): file for file in files}
 
 
 def _open_layer(path: Path) -> Sdf.Layer:

@@ -46,7 +46,16 @@ _MOVES: dict[str, str] = {
 
 
 def move_to_repeat(joint: str) -> str:
-    """Say which movement shows a joint, in a performer's words."""
+    """Say which movement shows a joint, in a performer's words.
+
+    Parameters
+    ----------
+    joint : str, the child segment
+
+    Returns
+    -------
+    str
+    """
     return _MOVES[joint[2:] if joint[:2] in ("l_", "r_") else joint]
 
 

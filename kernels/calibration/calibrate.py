@@ -52,7 +52,17 @@ def calibrate(cleaned: Cleaned, *, has_adjustment: bool = True) -> Calibration:
 
 
 def bone_lengths(in_parent_sensor_m: Float, in_child_sensor_m: Float) -> Float:
-    """Measure from the parent's own joint (midway between the hips for the pelvis) to each joint, (16,) metres."""
+    """Measure from the parent's own joint (midway between the hips for the pelvis) to each joint.
+
+    Parameters
+    ----------
+    in_parent_sensor_m, in_child_sensor_m : (16, 3) float, metres
+        Joints in the frames of their two sensors.
+
+    Returns
+    -------
+    (16,) float64, metres
+    """
     hips = [JOINTS.index("l_thigh"), JOINTS.index("r_thigh")]
     start = np.concatenate([in_parent_sensor_m[hips].mean(axis=0)[None], in_child_sensor_m])
     way = in_parent_sensor_m - start[list(PARENT[1:])]

@@ -126,7 +126,18 @@ def _nearby(away: Float) -> Float:
 
 
 def median_where(values: Float, is_good: Bools) -> Float:
-    """Median of each column (F, S) over its good rows; 0 where there is none."""
+    """Take the median of each column over its good rows.
+
+    Parameters
+    ----------
+    values : (F, S) float
+    is_good : (F, S) bool
+
+    Returns
+    -------
+    (S,) float64
+        0 where no row is good.
+    """
     return np.array(
         [np.median(values[is_good[:, s], s]) if is_good[:, s].any() else 0.0 for s in range(values.shape[1])]
     )

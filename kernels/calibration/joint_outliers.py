@@ -18,7 +18,7 @@ from kernels.calibration.records import PARENT, Bools
 from kernels.types import Float
 
 _TORN, _TORN_M = 4.0, 0.015
-_WHOLE, _WHOLE_M = 2.5, 0.008
+_WHOLE, _WHOLE_M, _NEAR = 2.5, 0.008, 4.0
 _SUSPECT = 0.6  # what an outlier by its own movement adds to the share of joints torn
 _MOST_FRAMES, _LEAST_FRAMES = 2000, 120
 _ABOVE, _BELOW = np.array(PARENT[1:]), np.arange(1, len(PARENT))
@@ -46,7 +46,8 @@ def judge_by_joints(position_xyz_m: Float, rotation_wxyz: Float, is_usable: Bool
     against its median over nine frames. Where it lies farther off than four times what is usual for the joint, one of
     the two sensors is wrong: that of which the larger share of joints is torn, those rather that
     stand out by themselves too.
-    An entry whose joints all hold, within two and a half times what is usual, is no outlier.
+    An entry whose joints all hold, within two and a half times what is usual, and
+    lie no farther apart than four times their median, is no outlier.
     """
     is_good = is_usable & ~is_outlier
     both = is_good[:, _ABOVE] & is_good[:, _BELOW]
@@ -64,7 +65,10 @@ def judge_by_joints(position_xyz_m: Float, rotation_wxyz: Float, is_usable: Bool
         usual = median_where(far, trusted)
         is_torn = is_there & (far > np.maximum(_TORN * usual, _TORN_M))
     is_blamed = _blame(is_torn, is_there, is_outlier)
-    is_whole = is_there & (far < np.maximum(_WHOLE * usual, _WHOLE_M))
+    size = np.sqrt(np.sum(apart * apart, axis=-1))
+    # in a long burst the median of nine is one of the burst: what is cleared must also be as near as it ever is
+    is_near = size < np.maximum(_NEAR * median_where(size, is_there & ~is_torn), _WHOLE_M)
+    is_whole = is_there & is_near & (far < np.maximum(_WHOLE * usual, _WHOLE_M))
     open_joints = is_there & ~(is_blamed[:, _ABOVE] | is_blamed[:, _BELOW])
     cleared = _of_sensors(open_joints & is_whole) == _of_sensors(open_joints)
     cleared &= _of_sensors(open_joints) > 0

@@ -63,19 +63,46 @@ def solve_poses(
 
 
 def body_model(calibration: Calibration) -> BodyModel:
-    """Build the body as the solvers see it."""
+    """Build the body as the solvers see it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+
+    Returns
+    -------
+    BodyModel
+    """
     return make_model(calibration.in_parent_sensor_m, calibration.in_child_sensor_m)
 
 
 def to_stream(cleaned: Cleaned) -> Stream:
-    """Take what the sensors said, interpolated entries at :data:`FILLED_WEIGHT`."""
+    """Take what the sensors said, interpolated entries at :data:`FILLED_WEIGHT`.
+
+    Parameters
+    ----------
+    cleaned : Cleaned of F frames
+
+    Returns
+    -------
+    Stream
+    """
     recording = cleaned.recording
     weight = np.where(cleaned.is_filled, FILLED_WEIGHT, 1.0)
     return Stream(recording.position_xyz_m, recording.rotation_wxyz, weight)
 
 
 def hip_centre(model: BodyModel) -> Float:
-    """Take the point midway between the hips, (3,) metres: no sensor shows where the pelvis begins."""
+    """Take the point midway between the hips: no sensor shows where the pelvis begins.
+
+    Parameters
+    ----------
+    model : BodyModel
+
+    Returns
+    -------
+    (3,) float64, metres, in the pelvis's frame
+    """
     hips = [SENSORS.index("l_thigh"), SENSORS.index("r_thigh")]
     centre: Float = model.offset_m[hips].mean(axis=0)
     return centre

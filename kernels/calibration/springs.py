@@ -53,7 +53,17 @@ class SpringBody:
 
 
 def spring_body(model: BodyModel) -> SpringBody:
-    """Weigh the bones of a body: inertia is half the square of the bone's length, at least 0.002."""
+    """Weigh the bones of a body.
+
+    Parameters
+    ----------
+    model : BodyModel
+
+    Returns
+    -------
+    SpringBody
+        Inertia is half the square of the bone's length, at least 0.002.
+    """
     n = len(model.parent)
     centre, turnability, hold = np.zeros((n, 3)), np.zeros(n), np.full(n, HOLD_STIFFNESS)
     for s in range(n):

@@ -114,6 +114,12 @@ def make_model(
 def check_stream(model: BodyModel, stream: Stream, iterations: int) -> None:
     """Refuse what no solver can take.
 
+    Parameters
+    ----------
+    model : BodyModel of S bones
+    stream : Stream of the S sensors
+    iterations : int
+
     Raises
     ------
     ValueError

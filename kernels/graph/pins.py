@@ -78,7 +78,8 @@ class Conflict:
     ----------
     pin_index : the fewest pins that cannot be kept together, in the order given
     reason : "nothing" (no node is admitted), "tempo" (none fits the beats there within the bounds), "start" (none can
-        be reached from the start in time, or the end from it), or "path" (each can be kept, not all of them)
+        be reached from the start in time, or the end from it), "same_time" (each can be kept, but no node is admitted
+        by all of those that meet in one interval), or "path" (each can be kept, not all of them)
     ways_out : nearest first, at most one shift and one choice a pin; empty where none was found
     """
 
@@ -192,14 +193,16 @@ class Reach:
         return True
 
 
-def find_conflict(reach: Reach, pins: Sequence[Pin], *, choices: Mapping[str, Mask] | None = None) -> Conflict | None:
+def find_conflict(
+    reach: Reach, pins: Sequence[Pin], *, choices: Sequence[Mapping[str, Mask]] | None = None
+) -> Conflict | None:
     """Find the fewest pins that cannot be kept together, and what would help.
 
     Parameters
     ----------
     reach : Reach of a song that can be danced without pins
     pins : as the director gave them
-    choices : other wishes to try in place of a conflicting one, by name: (N,) bool
+    choices : for each pin, other wishes to try in its place, by name: (N,) bool; the first that does is taken
 
     Returns
     -------
@@ -234,14 +237,15 @@ def find_conflict(reach: Reach, pins: Sequence[Pin], *, choices: Mapping[str, Ma
 
 def _reason(reach: Reach, pins: Sequence[Pin]) -> str:
     if len(pins) > 1:
-        return "path"
+        meet = range(max(pin.first for pin in pins), min(pin.last for pin in pins))
+        return "same_time" if meet and not np.all([pin.nodes for pin in pins], axis=0).any() else "path"
     if not pins[0].nodes.any():
         return "nothing"
     return "start" if reach.fits(pins[0]) else "tempo"
 
 
 def _ways_out(
-    reach: Reach, pins: Sequence[Pin], conflict: tuple[int, ...], choices: Mapping[str, Mask] | None
+    reach: Reach, pins: Sequence[Pin], conflict: tuple[int, ...], choices: Sequence[Mapping[str, Mask]] | None
 ) -> tuple[WayOut, ...]:
     """Try to move each conflicting pin, nearest beats first, and to ask for something else there."""
     found: list[WayOut] = []
@@ -257,7 +261,7 @@ def _ways_out(
                 if inside and reach.keeps([*rest, replace(pin, first=first, last=last)]):
                     found.append(WayOut(index, shift, ""))
                     break
-        for name, nodes in (choices or {}).items():
+        for name, nodes in (choices[index] if choices else {}).items():
             differs = not np.array_equal(nodes, pin.nodes)
             if differs and reach.keeps([*rest, replace(pin, nodes=nodes)]):
                 found.append(WayOut(index, 0, name))

@@ -10,10 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kernels.types import Float
+from kernels.types import Float, Int
 
 LEAST_WARP, MOST_WARP = 0.8, 1.25
 """Song time over clip time of a motion: never outside."""
+
+EASY_WARP = (0.9, 1.1)
+HARD_LOG = -6.0
+"""Beyond the easy bounds a motion counts so much less, natural log: danced only where nothing else fits."""
 
 WIDTH = 0.05
 """Standard deviation of the bump that each motion's length makes, in natural log: five per cent."""
@@ -57,8 +61,9 @@ def log_durations(grid_s: Float, motion_s: Sequence[Float], *, longest: int) -> 
     Returns
     -------
     (K, D, N) float64
-        A span of d intervals gets the sum of a bump round each motion's length; over d they sum to 1. -inf where no
-        motion reaches within the warp bounds, for a whole state where none does.
+        A span of d intervals gets the sum of a bump round each motion's length, as a share of all lengths there are
+        or, where none of them suits the state, of the length that would suit it best: over d they sum to at most 1, and
+        a state is passed over where the beats leave it no good length. -inf where no motion reaches within the bounds.
     """
     n_intervals = len(grid_s) - longest
     step = np.arange(longest) + 1
@@ -69,12 +74,21 @@ def log_durations(grid_s: Float, motion_s: Sequence[Float], *, longest: int) -> 
     for i, lengths in enumerate(motion_s):
         if not len(lengths):
             continue
-        known, n_each = np.unique(np.round(np.log(lengths), 3), return_counts=True)
+        known, n_each = np.unique(np.round(np.log(lengths).astype(np.float64), 3), return_counts=True)
         off = fine[:, None] - known[None]
         within = (off >= np.log(LEAST_WARP)) & (off <= np.log(MOST_WARP))
-        curve = (np.exp(-0.5 * (off / WIDTH) ** 2) * within) @ (n_each / n_each.sum())
+        easy = (off >= np.log(EASY_WARP[0])) & (off <= np.log(EASY_WARP[1]))
+        bump = np.exp(-0.5 * (off / WIDTH) ** 2) * np.where(easy, 1.0, np.exp(HARD_LOG)) * within
+        curve = bump @ (n_each / n_each.sum())
         found = np.interp(log_span, fine, curve)
-        total = found.sum(axis=1, keepdims=True)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            out[:, :, i] = np.where(found > 0, np.log(found / total), -np.inf)
+        suited = np.maximum(found.sum(axis=1, keepdims=True), _best(np.asarray(known, np.float64), n_each))
+        with np.errstate(divide="ignore"):
+            out[:, :, i] = np.where(found > 0, np.log(found / suited), -np.inf)
     return out
+
+
+def _best(log_length: Float, n_each: Int) -> float:
+    """Height of the curve at the length that suits best."""
+    off = log_length[:, None] - log_length[None]
+    near = np.exp(-0.5 * (off / WIDTH) ** 2) * (np.abs(off) <= np.log(EASY_WARP[1]))
+    return float((near @ (n_each / n_each.sum())).max())

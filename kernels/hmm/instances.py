@@ -11,15 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.hmm.durations import LEAST_WARP, MOST_WARP
+from kernels.hmm.durations import EASY_WARP, LEAST_WARP, MOST_WARP
 from kernels.matching.path import viterbi
 from kernels.types import Float, Int
 
-EASY_WARP = (0.9, 1.1)
 HARD_COST = 4.0
 """Added where the pace is beyond the easy bounds: as much as several rough seams."""
 
-LONGEST_RUN = 32
+LONGEST_RUN = 16
+"""Longer runs are all alike: a dance is not to be one long quotation where it need not be."""
+
+MOST_PRICED, MOST_EXCHANGES = 4, 4
+"""A motion shown more often than that costs no more; steps are gone through so often."""
+
+VARIETY = 0.3
+"""Mean of what is added to costs at random when motions are shortlisted, so that not always the same few are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +59,7 @@ def warp_cost(span_s: Float, motion_s: Float) -> Float:
     return np.asarray((np.log(warp) / np.log(1.1)) ** 2 + np.where(easy, 0.0, HARD_COST), np.float64)
 
 
-def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24) -> list[Int]:
+def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24, seed: int = 0) -> list[Int]:
     """Find motions for each step of a path: those that can be danced on end, and those nearest to their own pace.
 
     Parameters
@@ -62,6 +68,8 @@ def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24) ->
     state : (S,) int64, basic motion of each step
     span_s : (S,) float, seconds of song each takes
     most : int, >= 2
+    seed : int
+        Of the variety among motions that suit as well.
 
     Returns
     -------
@@ -83,8 +91,9 @@ def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24) ->
     ahead = _runs(fits[::-1], after, len(length))[::-1]
     behind = _runs(fits, before, len(length))
     found = []
+    rng = np.random.default_rng(seed)
     for step, here in enumerate(fits):
-        cost = warp_cost(span_s[step], length[here])
+        cost = warp_cost(span_s[step], length[here]) + rng.exponential(VARIETY, len(here))
         run = ahead[step] + behind[step]
         by_run = np.lexsort((here, cost, -run))
         by_pace = np.lexsort((here, cost))
@@ -138,7 +147,7 @@ def choose(
     Notes
     -----
     Repetition is no sum over neighbours, so it is priced in rounds: motions shown more than once become dearer, and
-    the best sequence found, by its true cost, is kept.
+    the best sequence found, by its true cost, is kept; then single steps are exchanged while that gains.
     """
     n = int(max(c.max() for c in candidates)) + 1
     price = np.zeros(n)
@@ -147,23 +156,53 @@ def choose(
         choice = viterbi([o + price[c] for o, c in zip(own, candidates, strict=True)], between)
         shown = np.array([c[i] for c, i in zip(candidates, choice, strict=True)], np.int64)
         again = repetition_weight * _times_before(shown)
-        total = float(
-            sum(o[i] for o, i in zip(own, choice, strict=True))
-            + sum(b[i, j] for b, i, j in zip(between, choice[:-1], choice[1:], strict=True))
-            + again.sum()
-        )
+        total = _total(choice, own, between) + float(again.sum())
         if total < best[0] - 1e-9:
             best = total, choice, again
         uses = np.bincount(shown, minlength=n)
         price = price + 0.25 * repetition_weight * np.maximum(uses - 1, 0)
-    return best[1], best[2], best[0]
+    choice = _exchange(best[1], candidates, own, between, repetition_weight) if repetition_weight > 0 else best[1]
+    shown = np.array([c[i] for c, i in zip(candidates, choice, strict=True)], np.int64)
+    again = repetition_weight * _times_before(shown)
+    return choice, again, _total(choice, own, between) + float(again.sum())
+
+
+def _total(choice: Int, own: Sequence[Float], between: Sequence[Float]) -> float:
+    return float(
+        sum(o[i] for o, i in zip(own, choice, strict=True))
+        + sum(b[i, j] for b, i, j in zip(between, choice[:-1], choice[1:], strict=True))
+    )
+
+
+def _exchange(
+    choice: Int, candidates: Sequence[Int], own: Sequence[Float], between: Sequence[Float], weight: float
+) -> Int:
+    """Change single steps while that makes the whole cheaper."""
+    choice = choice.copy()
+    uses = np.zeros(int(max(c.max() for c in candidates)) + 1, np.int64)
+    np.add.at(uses, [c[i] for c, i in zip(candidates, choice, strict=True)], 1)
+    for _ in range(MOST_EXCHANGES):
+        changed = False
+        for step, here in enumerate(candidates):
+            now = int(choice[step])
+            uses[here[now]] -= 1
+            price = own[step] + weight * np.minimum(uses[here], MOST_PRICED)
+            price = price + (between[step - 1][choice[step - 1]] if step else 0.0)
+            price = price + (between[step][:, choice[step + 1]] if step + 1 < len(candidates) else 0.0)
+            to = int(np.argmin(price))
+            if price[to] < price[now] - 1e-9:
+                choice[step], changed = to, True
+            uses[here[int(choice[step])]] += 1
+        if not changed:
+            break
+    return choice
 
 
 def _times_before(shown: Int) -> Float:
-    """How often each motion was shown before, capped at 4."""
+    """Count how often each motion was shown before, as far as it is priced."""
     seen: dict[int, int] = {}
     out = np.zeros(len(shown))
     for i, motion in enumerate(shown.tolist()):
-        out[i] = min(seen.get(motion, 0), 4)
+        out[i] = min(seen.get(motion, 0), MOST_PRICED)
         seen[motion] = seen.get(motion, 0) + 1
     return out

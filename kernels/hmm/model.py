@@ -196,7 +196,7 @@ def without(performances: Sequence[Performed], held: Sequence[tuple[int, int, in
     return [one for one in kept if len(one.state)]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Smoothing:
     """Which alphas were chosen for transitions and for each stream, and the held-out log-likelihood of each tried.
 

@@ -18,8 +18,9 @@ SIZES: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 20, 24, 32
 FEWEST_EACH = 12
 """No more states are tried than leave so many motions to each on average: fewer cannot be counted."""
 
-CLEAR = 0.7
-"""Clearness from which motions fall into kinds by themselves: then there are as many states as kinds."""
+CLEAR, ALIKE_RATIO = 0.7, 0.97
+"""Clearness from which motions fall into kinds by themselves: then the clearest number of states is taken, of numbers
+almost as clear (at least so much of it) the largest."""
 
 CLEAR_RATIO = 0.7
 """Else, as with most dancers, the largest number of states is chosen that is at least so clear as the clearest: finer
@@ -60,8 +61,8 @@ def cluster(vectors: Float, *, n_states: int = 0, seed: int = 0) -> States:
     ----------
     vectors : (N, D) float, N >= 1, finite
     n_states : int, >= 0
-        0: chosen among :data:`SIZES` by clearness (the simplified silhouette): the clearest where that is at least
-        :data:`CLEAR`, else the largest at least :data:`CLEAR_RATIO` as clear as the clearest; with
+        0: chosen among :data:`SIZES` by clearness (the simplified silhouette): the clearest (or almost) where that is
+        at least :data:`CLEAR`, else the largest at least :data:`CLEAR_RATIO` as clear as the clearest; with
         :data:`FEWEST_EACH` motions a state on average.
     seed : int
 
@@ -102,7 +103,7 @@ def cluster(vectors: Float, *, n_states: int = 0, seed: int = 0) -> States:
 def _chosen(tried: tuple[tuple[int, float], ...]) -> int:
     best = max(clear for _, clear in tried)
     if best >= CLEAR:
-        return min(k for k, clear in tried if clear == best)
+        return max(k for k, clear in tried if clear >= ALIKE_RATIO * best)
     return max(k for k, clear in tried if clear >= CLEAR_RATIO * best)
 
 

@@ -26,7 +26,16 @@ _PARENTS = {10: 5, 25: 5, 50: 25}
 
 
 def parent(n_frames: int) -> int:
-    """Which blocks larger blocks are summed from; 0 for blocks summed from frames."""
+    """Which blocks larger blocks are summed from; 0 for blocks summed from frames.
+
+    Parameters
+    ----------
+    n_frames : int, >= 1, frames of a block
+
+    Returns
+    -------
+    int, >= 0
+    """
     return _PARENTS.get(n_frames, 0)
 
 
@@ -50,6 +59,10 @@ class Rows:
 
     def steps(self, n_blocks: int) -> NDArray[np.int32]:
         """Where the blocks of each scale are.
+
+        Parameters
+        ----------
+        n_blocks : int, >= 0, blocks of a segment
 
         Returns
         -------
@@ -148,7 +161,17 @@ class Lists:
 
 
 def block_sums(segments: NDArray[np.float64], n_frames: int) -> NDArray[np.float64]:
-    """Sum blocks of segments, (N, L) to (N, ceil(L / g)); the last block may be short."""
+    """Sum blocks of segments, (N, L) to (N, ceil(L / g)); the last block may be short.
+
+    Parameters
+    ----------
+    segments : (N, L) float64, >= 0, filled up with zeros
+    n_frames : int, g >= 1
+
+    Returns
+    -------
+    (N, ceil(L / g)) float64
+    """
     n, length = segments.shape
     n_blocks = -(-length // n_frames)
     padded = np.zeros((n, n_blocks * n_frames))

@@ -147,5 +147,15 @@ def _percentile(values: Float, share: Float) -> float:
 
 
 def connects(pose_rad: Float, speed_rad_per_s: Float, limits: Thresholds) -> NDArray[np.bool_]:
-    """Whether both differences are within their thresholds, of the shape given."""
+    """Whether both differences are within their thresholds, of the shape given.
+
+    Parameters
+    ----------
+    pose_rad, speed_rad_per_s : float arrays of one shape, >= 0, of :func:`differences`
+    limits : Thresholds
+
+    Returns
+    -------
+    bool, of that shape
+    """
     return np.asarray((pose_rad <= limits.pose_rad) & (speed_rad_per_s <= limits.speed_rad_per_s))

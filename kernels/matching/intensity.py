@@ -25,6 +25,11 @@ def quantile_edges(values: Float, *, n_bins: int = N_BINS) -> Float:
     Returns
     -------
     (n_bins - 1,) float64, not falling; zeros without values
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two bins.
     """
     if n_bins < 2:
         raise ValueError(f"n_bins: want >= 2, got {n_bins}; one bin holds everything")
@@ -51,7 +56,16 @@ def histogram(values: Float, edges: Float) -> Float:
 
 
 def bhattacharyya(p: Float, q: Float) -> float:
-    """Bhattacharyya coefficient of two histograms: sum of sqrt(p q); 1 where they are equal, 0 where disjoint."""
+    """Bhattacharyya coefficient of two histograms: sum of sqrt(p q); 1 where they are equal, 0 where disjoint.
+
+    Parameters
+    ----------
+    p, q : (b,) float, >= 0, shares of sum 1, of :func:`histogram`
+
+    Returns
+    -------
+    float, 0 to 1; 0 where either is of no values
+    """
     return float(np.sqrt(p * q).sum())
 
 
@@ -99,5 +113,15 @@ def _centred_ranks(x: Float) -> Float:
 
 
 def agreement(coefficient: float, correlation: float) -> float:
-    """Agreement of intensity, 0 to 1: the mean of the Bhattacharyya coefficient and (1 + rank correlation) / 2."""
+    """Agreement of intensity, 0 to 1: the mean of the Bhattacharyya coefficient and (1 + rank correlation) / 2.
+
+    Parameters
+    ----------
+    coefficient : float, 0 to 1, of :func:`bhattacharyya`
+    correlation : float, -1 to 1, of :func:`rank_correlation`
+
+    Returns
+    -------
+    float, 0 to 1
+    """
     return (coefficient + (1.0 + correlation) / 2.0) / 2.0

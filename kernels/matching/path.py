@@ -76,7 +76,16 @@ class Joint:
 
 
 def continues(before: Candidates, after: Candidates) -> Mask:
-    """Whether each candidate after goes on where each before ended, (N, M) bool."""
+    """Whether each candidate after goes on where each before ended, (N, M) bool.
+
+    Parameters
+    ----------
+    before, after : Candidates of N and M pieces, of neighbouring segments
+
+    Returns
+    -------
+    (N, M) bool
+    """
     same = before.clip_index[:, None] == after.clip_index[None]
     return np.asarray(same & (np.abs(after.start_s[None] - before.end_s[:, None]) <= CONTINUES_S))
 
@@ -106,7 +115,18 @@ def viterbi(own: Sequence[Float], between: Sequence[Float]) -> Int:
 
 
 def overlaps(candidates: Candidates, clip_index: int, start_s: float, end_s: float) -> Float:
-    """Share of a piece of a clip that each candidate shows too, (N,) float64, 0 to 1."""
+    """Share of a piece of a clip that each candidate shows too, (N,) float64, 0 to 1.
+
+    Parameters
+    ----------
+    candidates : Candidates of N pieces
+    clip_index : int
+    start_s, end_s : float, seconds of that clip, end > start
+
+    Returns
+    -------
+    (N,) float64, 0 to 1; 0 for pieces of other clips
+    """
     common = np.minimum(candidates.end_s, end_s) - np.maximum(candidates.start_s, start_s)
     shown = np.clip(common / max(end_s - start_s, 1e-9), 0.0, 1.0)
     return np.where(candidates.clip_index == clip_index, shown, 0.0)

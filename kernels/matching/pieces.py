@@ -15,8 +15,8 @@ from kernels.types import Float, Int
 SNAP_REACH_S = 0.12
 """A start is moved no further: more would be another match."""
 
-OTHER_APART_S = 0.4
-"""Starts of one clip nearer to each other than this are the same piece: a beat at 150 a minute."""
+OTHER_APART_S = 0.5
+"""Starts of one clip nearer to each other than this are the same piece: about one beat."""
 
 OTHER_LEAST_RATIO = 0.8
 """Starts of a clip that score less than this share of its best are not offered."""
@@ -147,7 +147,7 @@ def other_starts(
     Returns
     -------
     (n,) int64, at most ``most``, the best first
-        Peaks of the score, at least 0.4 s from the match and from each other, that reach 0.8 of its score. Looked for
+        Peaks of the score, at least 0.5 s from the match and from each other, that reach 0.8 of its score. Looked for
         at every third frame and then near those, so that one of a lone impulse may be missed. None for silence.
     """
     scale = numerator / SCALE_DENOMINATOR
@@ -202,5 +202,15 @@ def split_span(start_s: float, end_s: float, *, beat_s: Float, longest_s: float)
 
 
 def longest_first(n_frames: Int, *, most: int) -> Int:
-    """Find the longest clips: indices, equal ones in order, at most ``most``."""
+    """Find the longest clips: indices, equal ones in order, at most ``most``.
+
+    Parameters
+    ----------
+    n_frames : (N,) int, frames of each clip
+    most : int, >= 0
+
+    Returns
+    -------
+    (min(N, most),) int64, indices of clips
+    """
     return np.argsort(-np.asarray(n_frames), kind="stable")[:most]

@@ -69,7 +69,16 @@ PLANS = (
 
 
 def built(plan: Plan) -> tuple[int, ...]:
-    """Block lengths whose rows must be summed for a plan, smaller before larger."""
+    """Block lengths whose rows must be summed for a plan, smaller before larger.
+
+    Parameters
+    ----------
+    plan : Plan
+
+    Returns
+    -------
+    tuple of int, rising; empty where no table is read
+    """
     wanted = {*plan.dense, *(g for g, _ in plan.folded)}
     while True:
         more = wanted | {parent(g) for g in wanted} - {0}

@@ -65,7 +65,18 @@ def similarity(a: NDArray[np.floating], b: NDArray[np.floating]) -> NDArray[np.f
 
 
 def start_count(n_segment: int, n_clip: int, numerator: int) -> int:
-    """Count the starts of a segment in a clip at the scale numerator / 50; 0 where it does not fit."""
+    """Count the starts of a segment in a clip at the scale numerator / 50; 0 where it does not fit.
+
+    Parameters
+    ----------
+    n_segment : int, L >= 1, frames of the segment
+    n_clip : int, T >= 0, frames of the clip
+    numerator : int, the scale times 50
+
+    Returns
+    -------
+    int, >= 0
+    """
     last = (numerator * (n_segment - 1) + SCALE_DENOMINATOR - 1) // SCALE_DENOMINATOR
     return max(n_clip - last, 0)
 
@@ -111,14 +122,33 @@ def sums(
 
 
 def ratios(score: float, music_sum: float, motion_sum: float) -> tuple[float, float]:
-    """C / (sum of a / 2) and 4 C / (sum of a + sum of b); 0 where the denominator is 0."""
+    """C / (sum of a / 2) and 4 C / (sum of a + sum of b); 0 where the denominator is 0.
+
+    Parameters
+    ----------
+    score : float, C >= 0
+    music_sum, motion_sum : float, >= 0, sums of a and of b
+
+    Returns
+    -------
+    music_ratio, mutual_ratio : float, >= 0
+    """
     music = score / (music_sum / 2) if music_sum > 0 else 0.0
     total = music_sum + motion_sum
     return music, (4 * score / total if total > 0 else 0.0)
 
 
 def music_sum(segment: NDArray[np.floating]) -> float:
-    """Sum of a, from the first frame to the last, in float64."""
+    """Sum of a, from the first frame to the last, in float64.
+
+    Parameters
+    ----------
+    segment : (L,) float, finite, >= 0
+
+    Returns
+    -------
+    float, >= 0; 0 for no frame
+    """
     total = 0.0
     for value in np.asarray(segment, np.float64).tolist():
         total += value
@@ -127,6 +157,12 @@ def music_sum(segment: NDArray[np.floating]) -> float:
 
 def check_series(series: Sequence[NDArray[np.floating]], name: str, *, shortest: int = 0) -> None:
     """Refuse features that no score is defined for.
+
+    Parameters
+    ----------
+    series : sequence of arrays, to be (F,) float, finite, >= 0
+    name : str, what they are, for the message
+    shortest : int, least frames of each
 
     Raises
     ------
@@ -144,6 +180,14 @@ def check_series(series: Sequence[NDArray[np.floating]], name: str, *, shortest:
 
 def numerators(scales: Sequence[float]) -> tuple[int, ...]:
     """Scales as whole fiftieths.
+
+    Parameters
+    ----------
+    scales : rising multiples of 1/50, at most 4
+
+    Returns
+    -------
+    tuple of int, the scales times 50
 
     Raises
     ------
@@ -256,6 +300,11 @@ def reference_matches(
 
 def check_query(segments: Sequence[NDArray[np.floating]], *, k: int) -> None:
     """Refuse a question without an answer.
+
+    Parameters
+    ----------
+    segments : sequence of arrays, to be (L,) float with L >= 1, finite, >= 0
+    k : int, to be >= 1
 
     Raises
     ------

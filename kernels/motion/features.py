@@ -289,13 +289,14 @@ def motion_features(
 
 
 def _inside(found: MotionFeatures, n: int, first: int) -> MotionFeatures:
-    """Features of ``n`` values, 0 but where those found lie."""
+    """Features of ``n`` values, 0 but where those found lie, scaled over all of them."""
     columns = []
     for values in (found.rhythm, found.intensity, found.effort_rad_per_s, found.peak_effort_rad_per_s):
         out = np.zeros(n)
         out[first : first + len(values)] = values[: max(n - first, 0)]
         columns.append(out)
-    return MotionFeatures(*columns)
+    rhythm, intensity, effort, peak = columns
+    return MotionFeatures(robust_unit(rhythm), robust_unit(intensity), effort, peak)
 
 
 def between(values: Float, frame: Int) -> Float:

@@ -49,6 +49,10 @@ LEAST_PROMINENCE_RATIO, LEAST_PROMINENCE_RAD_PER_S2 = 0.06, 0.3
 
 SHORTEST_S, LONGEST_S = 0.25, 2.0
 
+CHANGE_WEIGHT = 2.0
+"""How much what a motion changes of the body counts against the posture it starts from: the same step, danced a little
+more upright, is the same step."""
+
 
 @dataclass(frozen=True, eq=False)
 class KeyPoses:
@@ -215,7 +219,8 @@ def pose_vectors(position_xyz_m: Float, root_wxyz: Float, frame_rate_hz: float, 
     (N, 9 J) float64, metres
         Joints at start, peak and end, between frames by lines, seen from where the hips stand on the floor at the
         start and turned so that they face +Z there: where the dancer is and faces does not count, how far the motion
-        carries and turns him does.
+        carries and turns him does. The pose at the start, and the change from it to the other two, weighted by
+        :data:`CHANGE_WEIGHT`.
     """
     last = len(position_xyz_m) - 1
     moments = [np.clip(at * frame_rate_hz, 0, last) for at in (motions.start_s, motions.peak_s, motions.end_s)]
@@ -228,9 +233,18 @@ def pose_vectors(position_xyz_m: Float, root_wxyz: Float, frame_rate_hz: float, 
     first = np.rint(moments[0]).astype(np.int64)
     facing = rotation.from_heading(-rotation.heading_rad(root_wxyz[first]))
     turned = [rotation.apply(facing[:, None], p - origin[:, None]) for p in poses]
-    return np.concatenate(turned, axis=1).reshape(len(first), 9 * position_xyz_m.shape[1])
+    return to_vectors(np.stack(turned, axis=1))
+
+
+def to_vectors(poses_xyz_m: Float) -> Float:
+    """Weigh key poses, (N, 3, J, 3) metres, as motions are compared: vectors of :func:`pose_vectors`, (N, 9 J)."""
+    start = poses_xyz_m[:, :1]
+    parts = np.concatenate([start, CHANGE_WEIGHT * (poses_xyz_m[:, 1:] - start)], axis=1)
+    return np.asarray(parts.reshape(len(parts), 9 * poses_xyz_m.shape[2]), np.float64)
 
 
 def to_poses(vector: Float) -> NDArray[np.float64]:
     """Unpack vectors of :func:`pose_vectors`, (N, 9 J), to poses, (N, 3, J, 3) float64, metres."""
-    return vector.reshape(len(vector), 3, -1, 3)
+    parts = vector.reshape(len(vector), 3, -1, 3)
+    start = parts[:, :1]
+    return np.concatenate([start, start + parts[:, 1:] / CHANGE_WEIGHT], axis=1)

@@ -328,7 +328,8 @@ class Matcher:
         found: list[list[Match]],
     ) -> None:
         """Score what may be among the best in float64."""
-        scaled = np.ldexp(floor[chosen], -stages.tables.exponent).astype(np.float32)
+        most = np.finfo(np.float32).max
+        scaled = np.minimum(np.ldexp(floor[chosen], -stages.tables.exponent), most).astype(np.float32)
         lowest = np.where(floor[chosen] < 0, np.float32(-1), np.nextafter(scaled, np.float32(-np.inf)))
         pairs, score = finalists(stages, k=song.k, floor=lowest)
         frames, starts = chunk.flat()

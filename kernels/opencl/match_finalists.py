@@ -82,7 +82,7 @@ def _refined(
         wanted = ~done & (bound >= 0) & (bound + slack >= least[:, None])
         # where bounds tell little, a better score to beat is worth one more turn
         is_last = n_first >= n_clips or (done.any() and wanted.sum() < _FEW * bound.size)
-        chosen = wanted if is_last else wanted & _highest(np.where(wanted, bound, -1), n_first)
+        chosen = wanted if is_last else wanted & _highest(bound, n_first)
         pairs = _pairs(chosen)
         segment, clip = pairs.T
         found = stages.best(pairs, np.maximum(least[segment], known[segment, clip]))

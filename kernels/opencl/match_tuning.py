@@ -8,17 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.matching.plan import BRUTE, PLANS, Plan
+from kernels.matching.plan import BRUTE, PLANS, Plan, bytes_a_frame
 from kernels.opencl.match_finalists import finalists
 from kernels.opencl.match_program import Program
 from kernels.opencl.match_stages import Stages, wants_safe
 from kernels.opencl.match_tables import Tables
 
-_SEGMENTS = 32
-_CLIPS = 320
+_SEGMENTS = 128
+_CLIPS = 80
 _SPARSE = 0.5
 _TURNS = 3
 _HOPELESS = 1.5  # times the least so far: no further turn
+_AS_GOOD = 1.05
 _SURE_S = 0.1  # long enough to need no further turn
 
 
@@ -66,7 +67,8 @@ def pick_plan(
     Returns
     -------
     Plan
-        The fastest. Only the time of a search depends on it, never the answer.
+        The fastest, or one with less memory that is within a twentieth of it. Only the time of a search depends on
+        it, never the answer.
     """
     plans = worth_trying(segments, n_frames)
     some = np.unique(np.linspace(0, len(segments) - 1, _SEGMENTS).astype(int))
@@ -75,28 +77,31 @@ def pick_plan(
     is_safe = any(wants_safe(tables, float(segments[i].max())) is not False for i in some)
     k_sample = max(round(k * len(few) / len(clips)), 1)
     floor = np.full(len(some), -1, np.float32)
-    tried, warm = [], []
+    tried: list[Stages] = []
+    warm: list[Stages] = []
     for plan in plans:
         tables.build(plan)
-        for stages, chosen in ((tried, some), (warm, some[:2])):
-            stages.append(
+        for made, chosen in ((tried, some), (warm, some[:2])):
+            made.append(
                 Stages(
                     tables, segments[chosen], n_frames=n_frames[chosen], plan=plan, is_safe=is_safe, by_level=by_level
                 )
             )
     for stages in warm:  # compiles
         finalists(stages, k=k_sample, floor=floor[:2])
-    # turn by turn, for what else the machine does comes and goes. On a CPU the time of this process alone counts,
-    # others may want the machine too
+    # turn by turn, for what else the machine does comes and goes; some drivers still compile in the first turn, for
+    # larger sizes. On a CPU the time of this process alone counts, others may want the machine too
     now = time.process_time if program.is_cpu else time.perf_counter
     spent = np.full(len(plans), np.inf)
     for turn in range(_TURNS):
         for i, stages in enumerate(tried):
-            if turn > 0 and spent[i] > _HOPELESS * spent.min():
+            if turn > 1 and spent[i] > _HOPELESS * spent.min():
                 continue
             start = now()
             finalists(stages, k=k_sample, floor=floor)
             spent[i] = min(spent[i], now() - start)
-        if spent.min() > _SURE_S:
+        if turn > 0 and spent.min() > _SURE_S:
             break
-    return plans[int(np.argmin(spent))]
+    # as good as the fastest: the one with the least memory, whose index is the sooner built
+    good = [plan for plan, seconds in zip(plans, spent, strict=True) if seconds <= _AS_GOOD * spent.min()]
+    return min(good, key=lambda plan: bytes_a_frame(plan, numerators))

@@ -18,7 +18,7 @@ from kernels.search.normalise import channels
 from kernels.search.train import Trained, Training
 from kernels.types import Float, Int
 
-LABELLED = {"network": 0.40, "discriminant": 0.55, "principal": 0.05}
+LABELLED = {"network": 0.30, "discriminant": 0.68, "principal": 0.02}
 UNLABELLED = {"network": 0.5, "principal": 0.5}
 _VALIDATION_FOLDS = 6
 _PATIENCE = 3
@@ -93,7 +93,7 @@ def fit(
     held = _held_out(of, takes, how.seed)
     steps, validation = _choose_steps(motions, of, told, turned, how, spread, held, progress)
     weights = training.train(motions, of, how=replace(how, steps=steps), mirrored_label=turned, progress=progress)
-    telling = discriminant(told, of, N_DISCRIMINANT)
+    telling = mirrored_discriminant(motions, of, told, turned, has_travel=how.has_travel)
     return Fitted(Encoder(LABELLED, how.has_travel, spread, telling, weights), "labelled", steps, validation)
 
 
@@ -132,6 +132,30 @@ def mirrored_labels(position_xyz_m: Sequence[Float], label: Int, statistics: Flo
     return np.array([most[n] if most.get(most.get(n, -1), -2) == n else -1 for n in label.tolist()], np.int64)
 
 
+def mirrored_discriminant(
+    motions: Sequence[Float], label: Int, statistics: Float, turned: Int, *, has_travel: bool
+) -> Projection:
+    """Fit the discriminant to motions and, where that is known to be of a label, their mirror images.
+
+    Parameters
+    ----------
+    motions : N motions (T, 22, 3), metres
+    label, turned : (N,) int, labels, and those of the mirror images from :func:`mirrored_labels`
+    statistics : (N, D) float
+    has_travel : bool
+
+    Returns
+    -------
+    Projection to (..., N_DISCRIMINANT)
+    """
+    known = np.flatnonzero(turned >= 0)
+    if not len(known):
+        return discriminant(statistics, label, N_DISCRIMINANT)
+    other = statistics_of([mirror(motions[i]) for i in known.tolist()], has_travel=has_travel)
+    both = np.concatenate([statistics, other])
+    return discriminant(both, np.concatenate([label, turned[known]]), N_DISCRIMINANT)
+
+
 def _held_out(label: Int, take: Int, seed: int) -> NDArray[np.bool_]:
     """Choose whole takes to hold out, evenly of every label, never the only take of one."""
     first = np.unique(take, return_index=True)[1]
@@ -154,7 +178,8 @@ def _choose_steps(
     kept = ~held
     if not held.any() or len(np.unique(label[kept])) < 2:
         return how.steps, None
-    telling = discriminant(statistics[kept], label[kept], N_DISCRIMINANT)
+    shown = [motions[i] for i in np.flatnonzero(kept).tolist()]
+    telling = mirrored_discriminant(shown, label[kept], statistics[kept], turned[kept], has_travel=how.has_travel)
     best = (-1.0, how.steps, Retrieval(0.0, 0.0, 0))
     worse = 0
 
@@ -171,7 +196,7 @@ def _choose_steps(
         return worse >= _PATIENCE
 
     training.train(
-        [motions[i] for i in np.flatnonzero(kept).tolist()],
+        shown,
         label[kept],
         how=how,
         mirrored_label=turned[kept],

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kernels.assembly.blend import ease
+from kernels.assembly.joins import ease
 from kernels.music.notes import DRUM_CHANNEL_NUMBER, Notes, sorted_notes
 from kernels.synthetic.dancer import Figure, pose
+from kernels.synthetic.medley import sway
 from kernels.types import BeatGrid, Clip, Float, Int
 
 DRUM_KEYS: tuple[int, ...] = (36, 38, 42, 46, 49, 51, 45, 48, 39, 56, 54, 70)
@@ -25,6 +26,10 @@ HIT_AT = (0.0, 0.5, 0.75)
 
 REST = 0.08
 """Share of a motion that the body rests for at either end."""
+
+
+SWAY = 0.12
+"""Share of the slow sways of :func:`kernels.synthetic.medley.sway` that lies over the dance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +49,7 @@ def hidden_rules(*, n_states: int = 8, n_symbols: int = 12, loyalty: float = 0.8
     n_states : int, 3 to 8
     n_symbols : int, n_states to 12
     loyalty : float, 0 to 1
-        Share of a motion's strokes that fall on its own drum; at 1 / n_symbols the music tells nothing.
+        Share of a motion's strokes that fall on its own drum, beside those by chance; at 0 the music tells nothing.
     seed : int
 
     Returns
@@ -158,7 +163,7 @@ def perform(
     """
     state = draw_states(rules, n_motions, seed=seed)
     notes = draw_notes(rules, state, interval_s=interval_s, seed=seed)
-    edge_s = interval_s * np.arange(n_motions + 1)
+    edge_s: Float = interval_s * np.arange(n_motions + 1, dtype=np.float64)
     clip = dance(state, edge_s=edge_s, frame_rate_hz=frame_rate_hz, seed=seed, unsteady_s=unsteady_s)
     number = np.arange(n_motions)
     beats = BeatGrid(edge_s[:-1], number // 4 + 1, number % 4 + 1, np.ones(n_motions))
@@ -193,7 +198,8 @@ def dance(state: Int, *, edge_s: Float, frame_rate_hz: float, seed: int, unstead
     for index, gesture in enumerate(GESTURES.values()):
         here = (state[motion] == index).astype(np.float64)
         figure = gesture(figure, out * here, round_ * here)
-    return pose(figure, frame_rate_hz)
+    # No body comes back to quite the same pose.
+    return sway(pose(figure, frame_rate_hz), seed=seed, share=SWAY)
 
 
 def _stance(f: int) -> Figure:
@@ -249,12 +255,11 @@ def _bow(f: Figure, out: Float, round_: Float) -> Figure:
     return replace(f, lean=f.lean + 0.9 * out, chest_turn=f.chest_turn - 0.45 * round_)
 
 
-def _kick(f: Figure, out: Float, round_: Float, leg: int) -> Figure:
+def _kick(f: Figure, out: Float, round_: Float, side: int) -> Figure:
     foot = f.foot_xyz_m.copy()
-    foot[leg] += out[:, None] * np.array([0.0, 0.30, 0.45])
-    side = 1.0 - 2.0 * leg
-    swing = f.swing + side * 0.4 * _pair(-round_, round_)
-    return replace(f, foot_xyz_m=foot, swing=swing, raised=f.raised + 0.5 * _pair(out, out))
+    foot[side] += out[:, None] * np.array([0.0, 0.12, 0.22])
+    arm = np.eye(2)[side][:, None]
+    return replace(f, foot_xyz_m=foot, raised=f.raised + 1.4 * arm * out, swing=f.swing - 0.7 * arm * round_)
 
 
 def _left_kick(f: Figure, out: Float, round_: Float) -> Figure:

@@ -96,5 +96,44 @@ def test_reports(song, nodes):
         "would do: 2=spin in place of 2=spni",
     ]
     assert way_out(WayOut(1, -2, ""), pins, wishes, song) == "2.00-3.00=walk, 2 beats earlier than 3-4=walk"
-    assert "keeps them all" in sentences(Conflict((0, 1), "path", ()), pins, wishes, song, nodes)[0]
+    told = sentences(Conflict((0, 1), "path", ()), pins, wishes, song, nodes)[0]
+    assert told.endswith("keeps them all (1 beat between them)")
+    assert "at the same time" in sentences(Conflict((0, 1), "same_time", ()), pins, wishes, song, nodes)[0]
+    forbidden = sentences(Conflict((1,), "nothing", ()), pins, wishes, song, nodes)[0]
+    assert forbidden == "3-4=walk: what is labelled 'walk' may not be danced: its licence is not among those of 'allow'"
     assert kept(pins[1:], song, {6: "b", 7: "b"}) == [{"pin": "3-4=walk", "from_s": 3.0, "to_s": 4.0, "clips": ["b"]}]
+
+
+@pytest.mark.parametrize("shift", [-3, -1, 1, 2])
+@pytest.mark.parametrize("text", ["2.2=spin", "beat:5=spin", "3-4.6=walk", "bar:2=walk"])
+def test_a_way_out_can_be_typed_as_it_stands(nodes, text, shift):
+    """On beats that are no round seconds the shifted pin, typed, is the pin shifted."""
+    grid_s = np.cumsum(np.random.default_rng(5).uniform(0.41, 0.44, 24)) - 0.5
+    inside = grid_s[2:-2]
+    number = np.arange(len(inside))
+    beats = BeatGrid(inside, number // 4 + 1, number % 4 + 1, np.ones(len(inside)))
+    song = Song(grid_s, beats, float(grid_s[-1]) - 0.1)
+    wish = parse_pin(text)
+    pin = to_pin(wish, song, nodes)
+    typed = way_out(WayOut(0, shift, ""), [pin], [wish], song).partition(", ")[0]
+    again = to_pin(parse_pin(typed), song, nodes)
+    assert (again.first, again.last) == (pin.first + shift, pin.last + shift)
+
+
+def test_what_could_be_wished_instead_is_of_the_same_kind(nodes):
+    assert list(nodes.instead_of(parse_pin("1=spni"))) == ["spin", "walk"]
+    assert list(nodes.instead_of(parse_pin("1=jump"))) == ["spin", "walk"]  # what there is most of
+    assert list(nodes.instead_of(parse_pin("1=style:hop")))[:2] == ["style:hip", "style:x"]
+    assert next(iter(nodes.instead_of(parse_pin("1=clip:a")))) == "clip:a"
+    assert list(nodes.instead_of(parse_pin("1=not:spin"))) == ["spin", "walk"]
+
+
+def test_the_start_and_the_end_are_moments_one_can_see(nodes):
+    beats = BeatGrid(np.arange(1, 9) * 0.5, np.zeros(8, int), np.zeros(8, int), np.ones(8))
+    song = Song(np.arange(10) * 0.5 - 0.4, beats, 4.2)
+    start, end = (to_pin(parse_pin(f"{place}=spin"), song, nodes) for place in ("start", "end"))
+    assert (start.first, start.last) == (0, 2)  # of the first interval the song has a fifth
+    assert (end.first, end.last) == (8, 9)  # of the last most of it, from 3.6 to 4.1
+    short = Song(np.arange(10) * 0.5 - 0.4, beats, 3.7)
+    end = to_pin(parse_pin("end=spin"), short, nodes)
+    assert (end.first, end.last) == (7, 9)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from assets.licences import Terms, is_allowed, may_be_joined, report, terms_of, together
+from assets.licences import Terms, free_to_join, is_allowed, may_be_joined, report, terms_of, together
 
 
 @pytest.mark.parametrize(
@@ -69,3 +69,10 @@ def test_a_report_names_what_rules_and_what_nobody_knows():
     assert "2 of 4 clips have no licence that is known and count as the studio's own" in told["sentence"]
     assert "own terms" in report({"a": "CC-BY-SA-4.0", "b": "CC-BY-NC-4.0"})["sentence"]
     assert "own terms" not in report({"a": "CC-BY-SA-4.0", "b": "CC-BY-4.0"})["sentence"]
+
+
+def test_pieces_are_made_of_what_may_be_changed():
+    licence_of = {"a": "CC-BY-4.0", "b": "CC-BY-ND-4.0", "c": ""}
+    assert free_to_join(licence_of, ()) == {"a", "c"}
+    assert free_to_join(licence_of, ["CC-BY-4.0", "CC-BY-ND-4.0"]) == {"a"}
+    assert free_to_join({}, ()) == set()

@@ -1,14 +1,16 @@
-"""The song of a stage: decoded within the limits it was read with."""
+"""What goes into a stage: its song, and no clip in a blend that may not be changed."""
 
 from types import SimpleNamespace
 
+import dagster as dg
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from assets.formats import audio
 from assets.formats.audio import Audio
 from assets.formats.errors import FormatError
-from assets.stage import _sound
+from assets.stage import _sound, refuse_changed
 from schemas.settings import Limits, Settings
 
 
@@ -24,3 +26,12 @@ def test_a_song_that_a_raised_limit_let_in_reaches_its_stage(tmp_path):
     assert sound(2000.0).duration_s == length_s
     with pytest.raises(FormatError, match="at most 1200 s"):
         sound(1200.0)
+
+
+def test_a_blended_clip_that_may_not_be_changed_stops_the_stage():
+    frames = pa.table({"clip_id": ["a", "a", "b"], "blend_clip_id": pa.array([None, "b", None], pa.string())})
+    refuse_changed(frames, {"a": "CC-BY-4.0", "b": ""})
+    refuse_changed(frames.slice(2), {"a": "CC-BY-4.0", "b": "CC-BY-ND-4.0"})
+    for whole in ("a", "b"):
+        with pytest.raises(dg.Failure, match=f"got {whole} in a blend"):
+            refuse_changed(frames, {"a": "MIT", "b": "MIT"} | {whole: "CC-BY-NC-ND-4.0"})

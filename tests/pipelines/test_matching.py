@@ -11,7 +11,8 @@ from assets import matching_tables, tables
 from assets.formats import audio, bvh
 from assets.formats.audio import Audio
 from assets.formats.errors import FormatError
-from kernels.matching.score import reference_matches
+from kernels.matching.pieces import motion_under
+from kernels.matching.score import reference_matches, similarity
 from kernels.synthetic.dancer import take
 from kernels.types import Clip
 from pipelines import commands
@@ -76,19 +77,24 @@ def test_steps_are_the_matches_at_their_scales(matched):
     steps = store.table("choreography", "beat|matching").to_pylist()
     matches = store.table("match", "beat").to_pylist()
     segments = store.table("music_segment", "beat").to_pylist()
+    rhythm = store.table("music_feature", "beat")["rhythm"].to_numpy()
+    clips = {}
+    for session in store.keys("motion_feature"):
+        clips |= matching_tables.to_rhythms(store.table("motion_feature", session))
     assert steps[0]["song_start_s"] == 0
     assert steps[-1]["song_end_s"] == pytest.approx(store.table("song", "beat")["duration_s"][0].as_py())
     for segment in segments:
         step = next(s for s in steps if abs(s["song_start_s"] - segment["start_s"]) < 1e-9)
         near = [
-            m
-            for m in matches
-            if m["segment_index"] == segment["segment_index"]
-            and m["clip_id"] == step["clip_id"]
-            and abs(m["start_frame_index"] / 120 - step["clip_start_s"]) < 0.13
+            m for m in matches if m["segment_index"] == segment["segment_index"] and m["clip_id"] == step["clip_id"]
         ]
         assert len(near) == 1
         assert 1 / step["warp_ratio"] == pytest.approx(near[0]["scale_ratio"], abs=0.01)
+        # its start, or another in the clip where it matches nearly as well; brought to a beat
+        part = rhythm[segment["start_frame_index"] :][: segment["frame_count"]]
+        numerator = round(near[0]["scale_ratio"] * 50)
+        under = motion_under(clips[step["clip_id"]], len(part), numerator=numerator, start=120 * step["clip_start_s"])
+        assert similarity(part, under).sum() > 0.7 * near[0]["score"]
     assert all(s["stride_cost"] == s["beat_cost"] == 0 for s in steps)
     assert sum(s["match_cost"] for s in steps) > 0
     assert {s["method_name"] for s in steps} == {"matching"}

@@ -6,6 +6,7 @@ import shutil
 import polars as pl
 import pytest
 
+from assets.formats import usd_read
 from pipelines import commands
 from pipelines.files import StudioError
 from pipelines.resources import NoProgress
@@ -82,15 +83,39 @@ def test_pins_and_licences_of_the_brief(studio, dance):
     assert soft.facts["pins"] == [{**soft.facts["pins"][0], "is_kept": False}]
 
 
-def test_clips_that_may_not_be_changed_are_not_blended(studio, dance):
+@pytest.mark.parametrize("method", ["graph", "matching"])
+def test_clips_that_may_not_be_changed_are_not_blended(studio, dance, method):
     sheet = studio / "clips" / "ayame" / "clips.csv"
     sheet.write_text(sheet.read_text().replace("CC0-1.0", "CC-BY-ND-4.0"))
-    outcome = dance()
+    outcome = dance(method=method)
     assert outcome.status == 0, outcome.troubles
-    steps = pl.read_parquet(studio / "lake" / "choreography" / "beat|graph.parquet", glob=False)
+    frames = pl.read_parquet(studio / "lake" / "frame_lineage" / f"beat|{method}.parquet", glob=False)
+    blended = frames.filter(pl.col("blend_clip_id").is_not_null())
+    assert len(blended)
+    for column in ("clip_id", "blend_clip_id"):
+        assert not [clip for clip in blended[column].unique() if clip.startswith("ayame")]
+    steps = pl.read_parquet(studio / "lake" / "choreography" / f"beat|{method}.parquet", glob=False)
     seams = steps.with_row_index().filter("has_seam")["index"].to_list()
     around = {steps["clip_id"][k] for i in seams for k in (i - 1, i)}
     assert not [clip for clip in around if clip.startswith("ayame")]
+
+
+def test_licences_rule_the_export_and_matching_too(studio, dance):
+    sheet = studio / "clips" / "kaede" / "clips.csv"
+    sheet.write_text(sheet.read_text().replace("CC0-1.0", "CC-BY-NC-4.0", 1))
+    brief = studio / "songs" / "beat.brief.toml"
+    for method in ("graph", "matching"):
+        brief.write_text('allow = ["cc-by-nc-4.0"]\n')
+        outcome = dance(method=method)
+        assert outcome.status == 0, outcome.troubles
+        assert outcome.facts["licence"]["name"] == "CC-BY-NC-4.0"
+        assert outcome.facts["licence"]["terms"] == ["non commercial", "attribution"]
+        assert set(outcome.facts["clips"]) == {"kaede-rock"}
+        told = usd_read.read_provenance(studio / "dances" / "beat" / f"{method}.usdc")["licence"]
+        assert told["name"] == "CC-BY-NC-4.0"
+        assert told["terms"] == ["non commercial", "attribution"]
+        brief.write_text('allow = ["MIT"]\n')
+        assert "none has a licence of MIT" in "; ".join(dance(method=method).troubles)
 
 
 def test_alternatives_differ(studio, dance):

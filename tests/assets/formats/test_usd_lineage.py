@@ -59,7 +59,7 @@ def test_the_check_knows_it(stage, swaying, tmp_path):
         return [(f.severity, f.sentence) for f in usd_check.inspect(path) if f.rule == "odori:lineage"]
 
     assert found(stage) == []
-    usd.write_stage(tmp_path / "none.usdc", swaying)
+    usd.write_stage(tmp_path / "none.usdc", swaying, provenance={"clips": [{"clip_id": "walk"}]})
     assert found(tmp_path / "none.usdc") == [("warning", "odori:clip: want lineage, got none")]
     edited = Usd.Stage.Open(str(stage))
     animation = edited.GetPrimAtPath(contract.ANIMATION_PATH)

@@ -81,3 +81,12 @@ def test_other_sensors_than_a_suit_s_are_cleaned_alone(made):
         is_valid=recording.is_valid[:, :2],
     )
     assert clean(few).is_filled.shape == (recording.n_frames, 2)
+
+
+def test_a_long_burst_does_not_vouch_for_itself(quiet):
+    position, turned, is_valid = quiet
+    position = position.copy()
+    suspected = np.zeros_like(is_valid)
+    position[700:712, HAND] += [0.15, -0.1, 0.05]
+    suspected[700:712, HAND] = True
+    np.testing.assert_array_equal(judge_by_joints(position, turned, is_valid, suspected), suspected)

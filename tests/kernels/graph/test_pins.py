@@ -106,7 +106,7 @@ def test_reasons_and_ways_out(two_clips):
     first, second = two_clips.clip_index == 0, two_clips.clip_index == 1
     none = np.zeros(12, bool)
 
-    nothing = find_conflict(reach, [Pin("p", 0, 1, none)], choices={"first": first})
+    nothing = find_conflict(reach, [Pin("p", 0, 1, none)], choices=[{"first": first}])
     assert nothing.reason == "nothing"
     assert [(w.shift_beats, w.choice) for w in nothing.ways_out] == [(0, "first")]
 
@@ -117,6 +117,8 @@ def test_reasons_and_ways_out(two_clips):
     both = find_conflict(reach, [Pin("a", 3, 4, second), Pin("c", 0, 1, first), Pin("b", 4, 5, first)])
     assert both.reason == "path"
     assert both.pin_index == (0, 2)
+    at_once = find_conflict(reach, [Pin("a", 3, 5, second), Pin("b", 4, 5, first)])
+    assert (at_once.reason, at_once.pin_index) == ("same_time", (0, 1))
     assert find_conflict(reach, [Pin("a", 3, 4, second)]) is None
     assert find_conflict(reach, []) is None
 
@@ -154,3 +156,25 @@ def test_what_is_not_allowed_is_no_way(two_clips):
     assert only.is_danceable
     assert not only.keeps([Pin("second", 4, 5, ~first)])
     assert not Reach(two_clips, beat_s, costs=NO_USAGE, starts=np.array([0]), allowed=~first).is_danceable
+
+
+def test_soft_wishes_are_violated_where_hard_pins_are_kept(two_clips):
+    """The document's attribute values against a seam that costs more: the wish is paid for and not kept."""
+    beat_s = np.arange(6) * 0.5
+    second = two_clips.clip_index == 1
+    pin = Pin("second", 4, 5, second)
+    mask = admitted([pin], 5, 12)
+
+    def clips(path):
+        return {int(two_clips.clip_index[node]) for node in path.source_node}
+
+    soft = find_path(two_clips, beat_s, costs=NO_USAGE, starts=np.array([0]), interval_price=np.where(mask, 0.0, 1.0))
+    assert clips(soft) == {0}
+    assert soft.wish_cost.sum() == 1.0
+    assert not mask[soft.beat_index[-1], soft.source_node[-1]]
+    hard = find_path(two_clips, beat_s, costs=NO_USAGE, starts=np.array([0]), admissible=mask)
+    assert clips(hard) == {0, 1}
+    assert mask[hard.beat_index[-1], hard.source_node[-1]]
+    assert hard.total_cost > soft.total_cost
+    dear = find_path(two_clips, beat_s, costs=NO_USAGE, starts=np.array([0]), interval_price=np.where(mask, 0.0, 9.0))
+    assert clips(dear) == {0, 1}

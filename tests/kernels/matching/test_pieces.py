@@ -47,19 +47,23 @@ def others(clip_values, start, most=4, numerator=50, segment=SEGMENT):
     return found.tolist()
 
 
-STEPS = bumps(600, 60.0 * np.arange(1, 10), np.ones(9), width_s=0.05)
+STEPS = bumps(600, 62.0 * np.arange(1, 10), np.ones(9), width_s=0.05)
+
+
+STEPPING = bumps(240, np.array([0.0, 62, 124, 186]), np.ones(4), width_s=0.05)
 
 
 def test_steps_that_come_back_match_a_beat_on():
-    np.testing.assert_allclose(sorted(others(STEPS, 60, most=50)), [0, 120, 180, 240, 300, 360], atol=2)
-    assert others(STEPS, 60, most=2) == others(STEPS, 60, most=50)[:2]
+    found = others(STEPS, 62, most=50, segment=STEPPING)
+    np.testing.assert_allclose(sorted(found), [0, 124, 186, 248, 310], atol=2)
+    assert others(STEPS, 62, most=2, segment=STEPPING) == found[:2]
 
 
 def test_other_starts_are_apart_and_within_the_clip():
-    found = [60, *others(STEPS, 60, most=50)]
-    assert min(np.diff(sorted(found))) >= 48
+    found = [62, *others(STEPS, 62, most=50, segment=STEPPING)]
+    assert min(np.diff(sorted(found))) >= 60
     assert max(found) <= len(STEPS) - len(SEGMENT)
-    slow = others(STEPS, 60, numerator=55, most=50)
+    slow = others(STEPS, 62, numerator=55, most=50)
     assert all(f + 1.1 * (len(SEGMENT) - 1) <= len(STEPS) - 1 for f in slow)
 
 

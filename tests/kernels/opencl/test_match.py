@@ -2,7 +2,7 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from kernels.matching.plan import BRUTE, PLANS, Plan
+from kernels.matching.plan import BRUTE, BRUTE_SPARSE, PLANS, Plan
 from kernels.matching.score import merge_matches, reference_matches
 from kernels.opencl import match as module
 from kernels.opencl.device import list_devices
@@ -79,13 +79,33 @@ def test_features_of_very_different_sizes(program, size):
     assert Matcher(program=program, plan=PRUNED).matches(segments, clips, k=3) == expected
 
 
-def test_width_of_vectors_and_bundles_changes_nothing(program):
+@pytest.mark.slow  # compiles everything anew
+@pytest.mark.parametrize(("lanes", "together"), [(4, 3), (8, 1), (16, 16)])
+def test_width_of_vectors_and_bundles_changes_nothing(program, lanes, together):
     segments, clips = make("smooth", 3)
     expected = reference_matches(segments, clips, k=4)
-    for lanes, together in ((4, 1), (8, 3), (16, 16)):
-        other = Program(program.context, lanes=lanes, together=together)
-        assert Matcher(program=other, plan=PRUNED).matches(segments, clips, k=4) == expected
-        assert Matcher(program=other, plan=BRUTE).matches(segments, clips, k=4) == expected
+    other = Program(program.context, lanes=lanes, together=together)
+    assert Matcher(program=other, plan=PRUNED).matches(segments, clips, k=4) == expected
+    assert Matcher(program=other, plan=BRUTE).matches(segments, clips, k=4) == expected
+
+
+@pytest.mark.parametrize("plan", [plan for plan in PLANS if plan not in (BRUTE, BRUTE_SPARSE)], ids=str)
+def test_more_groups_wait_than_there_is_room_for(program, plan):
+    rng = np.random.default_rng(8)
+    segments = [rng.random(n).astype(np.float32) for n in (40, 12, 40, 7, 33, 1)]
+    # constant clips: every group passes every bound, and ties go by the rule
+    clips = [np.ones(1500, np.float32), rng.random(900).astype(np.float32), np.full(30, 0.5, np.float32)]
+    expected = reference_matches(segments, clips, k=2)
+    assert Matcher(program=program, plan=plan).matches(segments, clips, k=2) == expected
+
+
+def test_turns_of_refinement_change_nothing(program):
+    # bounds that tell nothing, and more clips than the first turns take
+    rng = np.random.default_rng(9)
+    segments = [rng.random(20).astype(np.float32)]
+    clips = [rng.random(36).astype(np.float32) for _ in range(80)]
+    expected = reference_matches(segments, clips, k=1)
+    assert Matcher(program=program, plan=PRUNED).matches(segments, clips, k=1) == expected
 
 
 def test_streams_chunks_and_an_index_answer_alike(program):

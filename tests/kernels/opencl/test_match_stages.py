@@ -6,7 +6,7 @@ from kernels.matching.plan import PLANS
 from kernels.matching.score import SCALE_NUMERATORS, similarity, start_count, sums
 from kernels.opencl.device import list_devices
 from kernels.opencl.match_program import Program
-from kernels.opencl.match_stages import SCALE_BITS, Stages, wants_safe
+from kernels.opencl.match_stages import SCALE_BITS, Stages, runs, wants_safe
 from kernels.opencl.match_tables import Tables
 
 DEVICES = list_devices()
@@ -71,3 +71,9 @@ def test_places_and_sizes(program, clips):
     assert SCALE_BITS == 24
     assert [wants_safe(tables, size) for size in (1.0, 1e-4, 1e4, 1e-12)] == [False, True, True, None]
     assert similarity(np.ones(1), np.ones(1)) == 0.5
+
+
+def test_runs_end_with_their_clip_and_at_their_longest():
+    assert runs(np.array([0, 0, 0, 2, 2, 2, 2, 2, 3]), longest=4).tolist() == [0, 3, 7, 8, 9]
+    assert runs(np.array([5, 5, 5]), longest=1).tolist() == [0, 1, 2, 3]
+    assert runs(np.zeros(0, np.int32), longest=4).tolist() == [0]

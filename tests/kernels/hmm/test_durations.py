@@ -1,0 +1,42 @@
+"""Lengths of motions on a song's beats: what fits, how well, and what does not."""
+
+import numpy as np
+import pytest
+
+from kernels.hmm.durations import HARD_LOG, log_durations, parts_per_beat, subdivide
+
+
+def test_a_motion_of_two_beats_takes_two():
+    grid = 0.5 * np.arange(9)
+    found = np.exp(log_durations(grid, [np.array([1.0]), np.array([0.5, 0.5, 1.0])], longest=4))
+    assert found.shape == (5, 4, 2)
+    np.testing.assert_allclose(found[:, :, 0], [[0, 1, 0, 0]] * 5, atol=5e-3)
+    np.testing.assert_allclose(found[0, :, 1], [2 / 3, 1 / 3, 0, 0], atol=5e-3)
+
+
+def test_a_state_no_length_suits_is_passed_over_not_made_up_for():
+    grid = 0.6 * np.arange(4)
+    found = log_durations(grid, [np.array([0.6]), np.array([0.52]), np.array([0.3])], longest=1)
+    assert found[0, 0, 0] == pytest.approx(0.0, abs=1e-3)
+    assert found[0, 0, 1] < HARD_LOG
+    assert np.isneginf(found[0, 0, 2])
+
+
+def test_a_state_without_motions_is_never_danced():
+    assert np.isneginf(log_durations(np.arange(4.0), [np.zeros(0)], longest=2)).all()
+
+
+def test_tempo_may_change():
+    grid = np.cumsum([0, 0.5, 0.5, 1.0, 1.0, 1.0])
+    found = log_durations(grid, [np.array([1.0])], longest=2)
+    assert found[:, :, 0].argmax(axis=1).tolist() == [1, 0, 0, 0]
+
+
+@pytest.mark.parametrize(("beat_s", "parts"), [(0.5, 1), (0.3, 1), (1.0, 2), (1.6, 3), (9.0, 4)])
+def test_slow_beats_are_cut(beat_s, parts):
+    assert parts_per_beat(beat_s, np.array([0.4, 0.5, 0.9])) == parts
+    assert parts_per_beat(beat_s, np.zeros(0)) == 1
+
+
+def test_cut_evenly():
+    np.testing.assert_allclose(subdivide(np.array([0.0, 1.0, 3.0]), 2), [0, 0.5, 1, 2, 3])

@@ -1,0 +1,80 @@
+"""Nearest windows and clips."""
+
+import numpy as np
+import pytest
+
+from kernels.search.discriminant import unit
+from kernels.search.nearest import distances, nearest_clips, propose, steer
+
+
+@pytest.fixture
+def catalogue(rng):
+    """Ten clips of three windows each."""
+    return unit(rng.normal(size=(30, 16))).astype(np.float32), np.arange(0, 30, 3)
+
+
+def test_distances_are_euclidean(catalogue):
+    vector, _ = catalogue
+    there = np.linalg.norm(vector[:4, None].astype(float) - vector[None], axis=-1)
+    np.testing.assert_allclose(distances(vector, vector[:4]), there, atol=5e-4)
+    assert distances(vector, vector[:0]).shape == (0, 30)
+
+
+def test_brute_force_is_the_specification(catalogue, rng):
+    vector, start = catalogue
+    query = unit(rng.normal(size=(4, 16))).astype(np.float32)
+    apart = np.linalg.norm(query[:, None].astype(float) - vector[None], axis=-1).reshape(4, 10, 3)
+    score = apart.min(axis=2).mean(axis=0)
+    hits = nearest_clips(vector, start, query, k=10)
+    assert [h.clip for h in hits] == np.argsort(score).tolist()
+    np.testing.assert_allclose([h.distance for h in hits], np.sort(score))
+    for hit in hits:
+        assert apart[hit.query_row, hit.clip, hit.row - 3 * hit.clip] == apart[:, hit.clip].min()
+
+
+def test_itself_is_at_distance_nothing(catalogue):
+    vector, start = catalogue
+    hits = nearest_clips(vector, start, vector[6:9], k=1)
+    assert (hits[0].clip, hits[0].distance) == (2, 0.0)
+
+
+def test_what_is_not_allowed_is_not_found(catalogue):
+    vector, start = catalogue
+    is_allowed = np.zeros(30, bool)
+    is_allowed[[4, 20]] = True
+    hits = nearest_clips(vector, start, vector[:1], k=5, is_allowed=is_allowed)
+    assert sorted((h.clip, h.row) for h in hits) == [(1, 4), (6, 20)]
+    assert nearest_clips(vector, start, vector[:1], k=5, is_allowed=np.zeros(30, bool)) == []
+    assert nearest_clips(vector[:0], start[:0], vector[:1], k=5) == []
+
+
+def test_good_candidates_give_the_exact_answer(catalogue, rng):
+    vector, start = catalogue
+    query = unit(rng.normal(size=(2, 16))).astype(np.float32)
+    exact = nearest_clips(vector, start, query, k=3)
+
+    def candidates(asked, n):
+        return np.unique([h.row for q in asked for h in nearest_clips(vector, start, q[None], k=n)])
+
+    assert nearest_clips(vector, start, query, k=3, candidates=candidates) == exact
+
+
+def test_liked_and_unliked_motions_pull_and_push(catalogue):
+    vector, _ = catalogue
+    query, like, unlike = vector[:1], vector[5:6], vector[9:10]
+    moved = steer(query, like, unlike)
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), 1, atol=1e-6)
+    assert moved[0] @ like[0] > query[0] @ like[0]
+    assert moved[0] @ unlike[0] < query[0] @ unlike[0]
+    np.testing.assert_allclose(steer(query[:0], like, unlike[:0]), like, atol=1e-6)
+    np.testing.assert_allclose(steer(query, like[:0], unlike[:0]), query, atol=1e-6)
+
+
+def test_the_near_have_the_say():
+    distance = np.array([[0.1, 0.1, 0.5, 0.9], [0.9, 0.8, 0.1, 0.7]])
+    first, second = propose(distance, np.array([4, 4, 7, 7]), n_neighbours=3)
+    assert (first[0].label, first[0].nearest, first[0].distance) == (4, 0, 0.1)
+    assert first[0].vote_ratio > 0.9
+    assert [p.label for p in second] == [7, 4]
+    assert sum(p.vote_ratio for p in second) == pytest.approx(1)
+    assert propose(np.zeros((1, 0)), np.zeros(0, int)) == [[]]

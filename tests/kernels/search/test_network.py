@@ -1,0 +1,48 @@
+"""The network: one definition for NumPy and JAX."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from kernels.search import network
+from kernels.search.normalise import N_CHANNELS
+
+
+@pytest.fixture
+def weights(rng):
+    return network.initial_weights(rng)
+
+
+@pytest.mark.parametrize("n_frames", [1, 3, 4, 37, 90])
+def test_numpy_and_jax_agree(weights, rng, n_frames):
+    channel, mask = network.batch([rng.normal(size=(n_frames, N_CHANNELS)).astype(np.float32)])
+    there = network.forward({k: jnp.asarray(v) for k, v in weights.items()}, channel, mask, jnp)
+    np.testing.assert_allclose(network.forward(weights, channel, mask), np.asarray(there), atol=2e-5)
+
+
+def test_what_lies_beyond_the_end_counts_for_nothing(weights, rng):
+    channel = rng.normal(size=(30, N_CHANNELS)).astype(np.float32)
+    alone = network.forward(weights, *network.batch([channel]))
+    padded, mask = network.batch([channel], 96)
+    padded[0, 30:] = 1e3
+    np.testing.assert_allclose(network.forward(weights, padded, mask), alone, atol=1e-5)
+
+
+def test_rows_of_a_batch_do_not_know_each_other(weights, rng):
+    stretches = [rng.normal(size=(n, N_CHANNELS)).astype(np.float32) for n in (5, 60, 33)]
+    together = network.forward(weights, *network.batch(stretches))
+    for row, stretch in zip(together, stretches, strict=True):
+        np.testing.assert_allclose(network.forward(weights, *network.batch([stretch]))[0], row, atol=1e-5)
+    np.testing.assert_allclose(np.linalg.norm(together, axis=1), 1, atol=1e-5)
+
+
+def test_batches_are_a_multiple_of_four_long():
+    channel, mask = network.batch([np.ones((5, N_CHANNELS), np.float32), np.ones((2, N_CHANNELS), np.float32)])
+    assert channel.shape == (2, 8, N_CHANNELS)
+    assert mask.sum(axis=1).tolist() == [5, 2]
+
+
+def test_weights_have_their_shapes_and_their_seed(weights):
+    assert {k: v.shape for k, v in weights.items()} == network.weight_shapes()
+    again = network.initial_weights(np.random.default_rng(0))
+    assert all(np.array_equal(weights[k], again[k]) for k in weights)
