@@ -26,7 +26,8 @@ N_FRAMES, REACH_S = 11, 0.5
 def seams_of(stage: Path) -> list[tuple[float, str]]:
     """Seconds of each seam, and what goes over into what, from what the stage says of its frames."""
     found, last = [], None
-    for prim in Usd.Stage.Open(str(stage)).Traverse():
+    opened = Usd.Stage.Open(str(stage))
+    for prim in opened.Traverse():
         told = prim.GetAttribute("odori:step")
         if not told:
             continue
