@@ -41,6 +41,7 @@ PLACES = {
     "motion_index": (6, -0.9),
     "label_proposal": (6, 0.1),
     "match": (3, 3.8),
+    "music_repeat": (3, 5.2),
     "percussion": (2, 6.8),
     "melody": (2, 7.8),
     "performance": (2, 8.8),

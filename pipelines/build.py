@@ -267,12 +267,21 @@ def bring_up_to_date(
 
 
 def unmade(batch: Batch, state: Freshness) -> set[tuple[str, str]]:
-    """Partitions a failed batch leaves as they were, and those of the same key that are made from them."""
-    assets = set(batch.assets)
+    """Partitions a failed batch leaves as they were, and those made from them: of the same key, and a song's dances.
+
+    What is made from many partitions, like the motion graph, goes on with what there is.
+    """
+    left = {(asset, key) for asset in batch.assets for key in batch.keys}
+    kind = state.assets[batch.assets[0]].kind
     for node in state.assets.values():  # inputs come first
-        if node.kind == state.assets[batch.assets[0]].kind and assets & set(node.inputs_of(batch.keys[0])):
-            assets.add(node.name)
-    return {(asset, key) for asset in assets for key in batch.keys}
+        if node.kind == kind:
+            keys: Iterable[str] = batch.keys
+        elif kind == "song" and node.kind == "dance":
+            keys = [key for key in state.partitions(node.name) if key.split("|")[0] in batch.keys]
+        else:
+            continue
+        left |= {(node.name, key) for key in keys if state.input_pairs(node.name, key) & left}
+    return left
 
 
 def last_failures(instance: dg.DagsterInstance, *, newest: int = 200) -> dict[tuple[str, str], str]:

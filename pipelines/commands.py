@@ -185,11 +185,13 @@ def dance(
             made.append(dancing.facts_of(studio, song.key, way))
     if out is not None and made:
         dancing.copy_out(made[0], out)
+    troubles += [f"failed: {f}" for f in report.failed]  # also where the dance could do without what failed
+    troubles = list(dict.fromkeys(troubles))
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
     facts = dancing.dances_facts(made, troubles, len(keys))
     if not made:
         facts |= next((dict(t.facts) for t in report.troubles if "conflict" in t.facts), {})
-    return Outcome(status, facts, "\n".join(dancing.report_of(d) for d in made), list(dict.fromkeys(troubles)))
+    return Outcome(status, facts, "\n".join(dancing.report_of(d) for d in made), troubles)
 
 
 def propose(
