@@ -5,8 +5,7 @@ import pyarrow as pa
 
 from assets import licences, tables
 from assets.declare import table_asset
-from assets.direction import Song as SongBeats
-from assets.graph_path import by_graph, catalogue, direction_of, read_clips
+from assets.graph_path import by_graph, catalogue, direction_of, heard_song, read_clips
 from assets.hmm_path import by_hmm, load_dancer
 from assets.hmm_tables import to_performances
 from assets.lineage import Part, Progress, Stored, repeatable
@@ -33,7 +32,8 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
         "[path]": "graph",
         "match": "matching",
         "music_segment": "matching",
-        "music_feature": "matching",
+        "music_repeat": "graph",
+        "music_feature": "graph,matching",
         "motion_feature": "matching",
         "motion_beat": "matching",
         "canonical_pose": "matching,hmm",
@@ -56,6 +56,7 @@ def choreography(
     match: Stored,
     music_segment: Stored,
     music_feature: Stored,
+    music_repeat: Stored,
     motion_feature: Stored,
     motion_beat: Stored,
     canonical_pose: Stored,
@@ -86,7 +87,8 @@ def choreography(
         graph, clip_ids = tables.to_motion_graph(motion_graph_node.read(), motion_graph_edge.read())
         clips = read_clips([clip.read(session) for session in clip.keys])
         known = catalogue(graph, clip_ids, clips, asked.allow)
-        danced = by_graph(known, SongBeats(beat_s, grid, duration_s), settings, asked)
+        feature, repeat = music_feature.read(song_id), music_repeat.read(song_id)
+        danced = by_graph(known, heard_song(grid, duration_s, feature=feature, repeat=repeat), settings, asked)
     elif asked.wishes:
         raise dg.Failure(
             f"{song_id}: pins are kept by the graph method alone; dance it with --method graph", allow_retries=False

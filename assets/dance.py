@@ -8,7 +8,7 @@ import numpy as np
 import polars as pl
 import pyarrow as pa
 
-from assets import plots, tables
+from assets import matching_tables, plots, tables
 from assets.declare import table_asset, table_assets
 from assets.lineage import Part, Progress, Stored
 from assets.partitions import DANCE, EVERY, lake_key
@@ -17,6 +17,7 @@ from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.quality import Measure
+from kernels.assembly.timing import cover
 from kernels.skeleton.canonical import CANONICAL, mirror
 from kernels.types import Choreography, Clip
 from schemas.choreography import DANCE_POSE, DANCE_QUALITY, FRAME_LINEAGE
@@ -45,7 +46,7 @@ def load_clips(canonical_pose: Stored, steps: Choreography) -> dict[str, Clip]:
     "assembly",
     (DANCE_POSE, FRAME_LINEAGE),
     group="dance",
-    code_version="1",
+    code_version="2",
     settings="dance",
     sources="request",
     partitions=DANCE,
@@ -85,7 +86,7 @@ def assembly(
 @table_asset(
     DANCE_QUALITY,
     group="dance",
-    code_version="2",
+    code_version="3",
     partitions=DANCE,
     ins={"canonical_pose": _EVERY_CLIP, "clip": _EVERY_CLIP},
     checks={
@@ -101,6 +102,7 @@ def dance_quality(
     dance_pose: pa.Table,
     frame_lineage: pa.Table,
     music_beat: pa.Table,
+    music_feature: pa.Table,
     canonical_pose: Stored,
     clip: Stored,
     progress: dg.ResourceParam[Progress],
@@ -111,6 +113,8 @@ def dance_quality(
     steps = tables.to_choreography(choreography)
     dance = tables.to_dance(dance_pose, frame_lineage, steps)
     beat_s = tables.to_music_beat(music_beat).time_s
+    grid_s, _ = cover(beat_s, float(steps.song_end_s[-1]))
+    strength = matching_tables.strength_between(music_feature, grid_s)
     clips = load_clips(canonical_pose, steps)
     found = {
         "beats": [*quality.lag_measures(dance, steps, beat_s), *quality.beat_measures(dance, beat_s)],
@@ -120,6 +124,7 @@ def dance_quality(
             *foot_quality.foot_measures(dance, steps, clips),
             *foot_quality.knee_measures(dance, steps, clips),
         ],
+        "intensity": quality.intensity_measures(dance, strength, grid_s),
         "catalogue": quality.catalogue_measures(_of_sources(steps), _seconds(clip)),
     }
     progress.step()
@@ -129,7 +134,7 @@ def dance_quality(
     table = tables.from_dance_quality(song_id, method, every)
     yield dg.Output(Part(f"{song_id}|{method}", table, metadata={"timeline": picture}))
     for name, measures in found.items():
-        if name != "catalogue":
+        if name not in ("intensity", "catalogue"):
             yield _check(name, measures)
 
 

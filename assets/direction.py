@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.graph.pins import Conflict, Pin, WayOut
+from kernels.music.repeats import Repeat
 from kernels.types import BeatGrid, Float
 from schemas.pins import PinWish
 
@@ -26,11 +27,15 @@ class Song:
     grid_s : (K + 1,) float64, seconds, the beats the dance covers, those before and after the song's own included
     beats : BeatGrid, the song's own
     duration_s : float, seconds, > 0
+    intensity : (K,) float, how strong each interval of the grid is, or None where it is not known
+    repeats : stretches of the grid that play earlier ones again
     """
 
     grid_s: Float
     beats: BeatGrid
     duration_s: float
+    intensity: Float | None = None
+    repeats: Sequence[Repeat] = ()
 
     @property
     def own(self) -> NDArray[np.int64]:

@@ -21,7 +21,7 @@ from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
 from kernels.graph.shortlist import nearest_of
 from kernels.graph.transitions import Transitions, blend_margin_s, connect
-from kernels.motion.velocity import accents, jerk_around
+from kernels.motion.velocity import accents, jerk_around, speed_between
 from kernels.skeleton.canonical import CANONICAL, JOINTS, mirror
 from kernels.skeleton.kinematics import forward
 from kernels.types import Float, MotionGraph
@@ -29,7 +29,7 @@ from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
 from schemas.keys import mirrored, source_clip
 from schemas.settings import MotionGraphSettings
 
-MEMORY_VERSION = "1"
+MEMORY_VERSION = "2"
 """Raised by hand when features, rules or the shortlist change meaning."""
 
 PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
@@ -44,7 +44,7 @@ PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
     "motion_graph",
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
-    code_version="3",
+    code_version="4",
     settings="motion_graph dance.blend_s",
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
     checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
@@ -86,7 +86,7 @@ def motion_graph(
     found = connect(nodes, pairs, threshold=settings.threshold or None)
     seen = {
         name: np.concatenate([*(getattr(b, name) for b in beats), np.zeros(0)])
-        for name in ("accent", "peak_jerk", "usual_jerk")
+        for name in ("accent", "peak_jerk", "usual_jerk", "speed")
     }
     graph = replace(found.graph, **seen)
     losses = {name: prune(graph) for name, prune in PRUNE.items()}
@@ -168,7 +168,9 @@ def _beats(moved: tables.CanonicalClip, beat_s: Float, version: str, settings: M
     )
     peak, usual = jerk_around(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
     accent = accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
-    return Beats(moved.clip_id, version, moved.duration_s, time_s, features, accent, peak, np.full(len(time_s), usual))
+    speed = speed_between(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
+    usual_at = np.full(len(time_s), usual)
+    return Beats(moved.clip_id, version, moved.duration_s, time_s, features, accent, peak, usual_at, speed)
 
 
 def _of_no_beat(settings: MotionGraphSettings) -> BeatFeatures:

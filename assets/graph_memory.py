@@ -14,7 +14,7 @@ from kernels.graph.shortlist import Shortlist, Work, make_shortlist, update_shor
 from kernels.graph.transitions import Nearest
 from kernels.types import Float, Int
 
-_CLIP_ARRAYS = ("time_s", "accent", "peak_jerk", "usual_jerk")
+_CLIP_ARRAYS = ("time_s", "accent", "peak_jerk", "usual_jerk", "speed")
 _PAIR_ARRAYS = ("row", "other", "distance", "weight")
 
 
@@ -30,6 +30,7 @@ class Beats:
     accent: Float
     peak_jerk: Float
     usual_jerk: Float
+    speed: Float
 
 
 class Memory(Protocol):

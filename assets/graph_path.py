@@ -10,18 +10,19 @@ import polars as pl
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from assets import direction, licences, plots
+from assets import direction, licences, matching_tables, plots
 from assets.danced import Danced
 from assets.direction import DirectionError, Nodes
 from assets.direction import Song as SongBeats
 from assets.partitions import alternative_number
 from assets.sources import Studio, brief_of, request_of
-from kernels.assembly.timing import blend_widths, trim
-from kernels.graph.alternatives import find_alternatives, shared_ratio
-from kernels.graph.costs import PathCosts
+from kernels.assembly.timing import blend_widths, cover, trim
+from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
+from kernels.graph.costs import PathCosts, intensity_price
 from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
 from kernels.graph.pins import Pin, Reach, admitted, find_conflict
-from kernels.types import Choreography, Float, Int, MotionGraph
+from kernels.graph.structure import structure_pins
+from kernels.types import BeatGrid, Choreography, Float, Int, MotionGraph
 from schemas.keys import source_clip
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
@@ -121,43 +122,83 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
     if not known.is_allowed.any() and len(known.is_allowed):
         raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
     costs = path_costs(settings.path)
-    wish_price = None
+    strength = strength_price(known, song, settings.path)
+    interval_price = strength
     if pins and asked.is_soft:
-        wish_price = np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH)
+        interval_price = strength + np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH)
     elif pins:
         refuse_conflict(known, song, pins, asked, costs)
         mask = mask & admitted(pins, *mask.shape)
-    is_free = bool(mask.all())
 
-    def find(price: Float) -> Path:
+    def find(price: Float, mask: NDArray[np.bool_]) -> Path:
         return search(
             graph,
             song.grid_s,
             costs,
-            admissible=None if is_free else np.ascontiguousarray(mask),
+            admissible=None if mask.all() else np.ascontiguousarray(mask),
             stretch_price=price if price.any() else None,
-            interval_price=wish_price,
+            interval_price=interval_price if interval_price.any() else None,
         )
 
-    found = find_alternatives(graph, asked.alternative, find=find)
+    found = find_alternatives(graph, asked.alternative, find=lambda price: find(price, mask))
+    n_repeated = 0
+    if settings.path.repeat == "structure" and song.repeats:
+        reach = Reach(
+            graph, song.grid_s, costs=costs, starts=np.flatnonzero(known.is_allowed), allowed=known.is_allowed
+        )
+        own, n_repeated = structure_pins(found[-1], song.repeats, reach, kept=[] if asked.is_soft else pins)
+        again = mask & admitted(own, *mask.shape)
+        price = shown_price(graph, found[:-1], diversity=1.0)
+        found = [*found[:-1], find(price, again)] if own else found
     path = found[-1]
     steps, kept = chosen_steps(path, graph, song.grid_s, known.clip_ids, song.duration_s, settings.dance)
-    columns = ("transition", "warp", "stride", "beat", "repetition", "diversity", "wish")
+    spans = zip(path.beat_index.tolist(), path.beat_span.tolist(), path.source_node.tolist(), strict=True)
+    intensity = np.array([strength[k : k + d, u].sum() for k, d, u in spans])
+    columns = ("transition", "warp", "stride", "beat", "repetition", "diversity")
+    every = {name: getattr(path, f"{name}_cost") for name in columns}
+    every |= {"intensity": intensity, "wish": np.maximum(path.wish_cost - intensity, 0.0)}
     return Danced(
         steps,
-        {f"{name}_cost": getattr(path, f"{name}_cost")[kept] for name in columns},
+        {f"{name}_cost": values[kept] for name, values in every.items()},
         {
             "cost": path.total_cost,
-            "costs": dg.MetadataValue.json({name: float(getattr(path, f"{name}_cost").sum()) for name in columns}),
+            "costs": dg.MetadataValue.json({name: float(values.sum()) for name, values in every.items()}),
             "seams": int(steps.has_seam.sum()),
             "clips": len(set(steps.clip_id)),
             "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
+            "parts_danced_again": n_repeated,
             "shared_with_the_best": shared_ratio(graph, path, found[0]) if len(found) > 1 else 1.0,
             "pins": dg.MetadataValue.json(kept_pins(pins, song, path, known)),
             "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
         },
         [pin_of_step(pins, int(k), int(d)) for k, d in zip(path.beat_index[kept], path.beat_span[kept], strict=True)],
     )
+
+
+def strength_price(known: Catalogue, song: SongBeats, settings: PathSettings) -> Float:
+    """Price of movement unlike the music in strength, (K, N); zeros where the song's is not known."""
+    if song.intensity is None or not settings.intensity_weight:
+        return np.zeros((len(song.grid_s) - 1, len(known.graph.clip_index)))
+    return intensity_price(song.intensity, known.graph, weight=settings.intensity_weight)
+
+
+def heard_song(
+    beats: BeatGrid, duration_s: float, *, feature: pa.Table | None = None, repeat: pa.Table | None = None
+) -> SongBeats:
+    """Gather what a dance knows of its song.
+
+    Parameters
+    ----------
+    beats : BeatGrid of at least two
+    duration_s : float, seconds, > 0
+    feature, repeat : rows of ``music_feature`` and ``music_repeat`` of the song, or None
+    """
+    grid_s, _ = cover(beats.time_s, duration_s)
+    intensity = None
+    if feature is not None and feature.num_rows:
+        intensity = matching_tables.strength_between(feature, grid_s)
+    repeats = matching_tables.to_music_repeat(repeat, grid_s) if repeat is not None else []
+    return SongBeats(grid_s, beats, duration_s, intensity, repeats)
 
 
 def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
@@ -228,6 +269,7 @@ def path_costs(settings: PathSettings) -> PathCosts:
         transition=usual.transition * settings.transition_weight,
         warp=usual.warp * settings.warp_weight,
         usage=usual.usage * settings.repetition_weight,
+        seam=settings.seam_cost,
         missed_beat=usual.missed_beat * settings.beat_weight,
         jump_back=usual.jump_back * settings.repetition_weight,
     )
@@ -257,6 +299,6 @@ def chosen_steps(
     return replace(steps, blend_s=width), kept
 
 
-def read_clips(tables: Sequence[pa.Table]) -> pl.DataFrame:
+def read_clips(parts: Sequence[pa.Table]) -> pl.DataFrame:
     """Gather the rows of all sessions' clips that were read."""
-    return pl.concat([pl.DataFrame(t) for t in tables]).filter(pl.col("state") == "read")
+    return pl.concat([pl.DataFrame(t) for t in parts]).filter(pl.col("state") == "read")

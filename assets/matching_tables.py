@@ -10,15 +10,16 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from assets.tables import by_clip, to_numbers
+from assets.tables import by_clip, from_rows, to_numbers
 from kernels.matching.score import SCALES, Match
 from kernels.motion.features import MotionFeatures
 from kernels.music.features import MusicFeatures
+from kernels.music.repeats import Repeat
 from kernels.music.segments import Segments
 from kernels.types import Float, Int
 from schemas.matching import MATCH
 from schemas.motion import MOTION_FEATURE
-from schemas.music import MUSIC_FEATURE, MUSIC_SEGMENT
+from schemas.music import MUSIC_FEATURE, MUSIC_REPEAT, MUSIC_SEGMENT
 
 Rhythm = NDArray[np.float32]
 
@@ -111,6 +112,43 @@ def from_music_segment(song_id: str, segments: Segments) -> pa.Table:
     return MUSIC_SEGMENT.check(pa.table(columns, schema=MUSIC_SEGMENT.arrow))
 
 
+def strength_between(feature: pa.Table, grid_s: Float) -> Float:
+    """Mean intensity of the music between beats, (K,) of (K + 1,) seconds; zeros where the song has none."""
+    total = np.append(0.0, np.cumsum(to_numbers(feature["intensity"]).astype(np.float64)))
+    edge = np.clip(np.searchsorted(to_numbers(feature["time_s"]), grid_s), 0, len(total) - 1)
+    return np.asarray((total[edge[1:]] - total[edge[:-1]]) / np.maximum(np.diff(edge), 1), np.float64)
+
+
+def from_music_repeat(song_id: str, repeats: Sequence[Repeat], grid_s: Float) -> pa.Table:
+    """Pack the repeats of a song, in seconds of the grid of beats they were found on, (K + 1,)."""
+    return from_rows(
+        MUSIC_REPEAT,
+        [
+            {
+                "song_id": song_id,
+                "repeat_index": i,
+                "start_s": float(grid_s[r.first]),
+                "end_s": float(grid_s[r.last]),
+                "source_start_s": float(grid_s[r.source]),
+                "likeness_score": r.likeness,
+            }
+            for i, r in enumerate(repeats)
+        ],
+    )
+
+
+def to_music_repeat(rows: pa.Table, grid_s: Float) -> list[Repeat]:
+    """Unpack the repeats of a song onto its grid of beats; those whose beats have gone are left out."""
+    found = []
+    for row in rows.to_pylist():
+        first, last, source = (
+            int(np.abs(grid_s - row[name]).argmin()) for name in ("start_s", "end_s", "source_start_s")
+        )
+        if source < first < last <= len(grid_s) - 1:
+            found.append(Repeat(first, last, source, row["likeness_score"]))
+    return found
+
+
 def to_music_segment(rows: pa.Table) -> Segments:
     """Unpack a song's segments.
 
@@ -195,7 +233,12 @@ class StoredMatches:
     mutual_ratio: Float
 
     def only(self, kept: Sequence[bool]) -> StoredMatches:
-        """Take some of them, by (N,) truths."""
+        """Take some of them.
+
+        Parameters
+        ----------
+        kept : N truths
+        """
         mask = np.array(kept, bool)
         return StoredMatches(
             tuple(itertools.compress(self.clip_ids, mask)),

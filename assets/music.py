@@ -19,6 +19,7 @@ from kernels.music.features import music_features
 from kernels.music.intensity import loudness_db
 from kernels.music.level import change_level, nudge
 from kernels.music.preview import render_preview
+from kernels.music.repeats import find_repeats
 from kernels.music.segments import beat_features, cut_song, novelty
 from kernels.types import BeatGrid, Float
 from schemas import music as schema
@@ -211,9 +212,9 @@ def _row(song: Song, heard: Heard | None, reason: str) -> dict[str, object]:
 
 @table_assets(
     "music_analysis",
-    (schema.MUSIC_FEATURE, schema.MUSIC_SEGMENT),
+    (schema.MUSIC_FEATURE, schema.MUSIC_SEGMENT, schema.MUSIC_REPEAT),
     group="music",
-    code_version="1",
+    code_version="2",
     settings="feature music_segment limits",
     sources="song",
     partitions=SONG,
@@ -225,11 +226,11 @@ def music_analysis(
     studio: dg.ResourceParam[Studio],
     progress: dg.ResourceParam[Progress],
 ) -> Iterator[dg.Output[Parts]]:
-    """Measure rhythm and intensity of every song, and cut it into segments."""
+    """Measure rhythm and intensity of every song, cut it into segments, and find what it plays again."""
     songs = studio.sources().songs_by_key()
     keys = [lake_key(key) for key in context.partition_keys]
     progress.begin("measuring songs", len(keys))
-    made: list[tuple[Part, Part]] = []
+    made: list[tuple[Part, Part, Part]] = []
     for key in keys:
         version = version_of(song_version(songs.get(key, ())), brief_version(studio, songs.get(key, ())))
         read = [row for row in song.read(key).to_pylist() if row["state"] == "read"]
@@ -239,15 +240,21 @@ def music_analysis(
                 made.append(_analysed(key, read[0], grid, studio, version))
         else:
             made.append(
-                (Part(key, schema.MUSIC_FEATURE.empty(), version), Part(key, schema.MUSIC_SEGMENT.empty(), version))
+                (
+                    Part(key, schema.MUSIC_FEATURE.empty(), version),
+                    Part(key, schema.MUSIC_SEGMENT.empty(), version),
+                    Part(key, schema.MUSIC_REPEAT.empty(), version),
+                )
             )
         progress.step()
-    yield dg.Output(Parts([features for features, _ in made]), schema.MUSIC_FEATURE.name)
-    yield dg.Output(Parts([segments for _, segments in made]), schema.MUSIC_SEGMENT.name)
+    for number, table in enumerate((schema.MUSIC_FEATURE, schema.MUSIC_SEGMENT, schema.MUSIC_REPEAT)):
+        yield dg.Output(Parts([parts[number] for parts in made]), table.name)
 
 
-def _analysed(key: str, row: dict[str, object], grid: BeatGrid, studio: Studio, version: str) -> tuple[Part, Part]:
-    """Features and segments of one song that can be danced to."""
+def _analysed(
+    key: str, row: dict[str, object], grid: BeatGrid, studio: Studio, version: str
+) -> tuple[Part, Part, Part]:
+    """Features, segments and repeats of one song that can be danced to."""
     settings = studio.settings()
     place, duration_s = studio.file(str(row["path"])), float(row["duration_s"])  # type: ignore[arg-type]
     if row["kind"] == "midi":
@@ -261,11 +268,12 @@ def _analysed(key: str, row: dict[str, object], grid: BeatGrid, studio: Studio, 
     grid_s, is_beat = cover(grid.time_s, duration_s)
     number = np.zeros(len(grid_s), np.int64)
     number[is_beat] = grid.beat_in_bar_number
+    heard = beat_features(samples, rate_hz, grid_s=grid_s)
     segments = cut_song(
         grid_s,
         duration_s=duration_s,
         beat_in_bar_number=number,
-        change=novelty(beat_features(samples, rate_hz, grid_s=grid_s)),
+        change=novelty(heard),
         longest_s=settings.music_segment.longest_s,
     )
     picture = matching_plots.song_features(found.time_s, found.rhythm, found.intensity, segments)
@@ -277,4 +285,5 @@ def _analysed(key: str, row: dict[str, object], grid: BeatGrid, studio: Studio, 
             version,
             metadata={"segments": dg.MetadataValue.md(picture)},
         ),
+        Part(key, matching_tables.from_music_repeat(key, find_repeats(heard), grid_s), version),
     )

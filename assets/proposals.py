@@ -9,15 +9,22 @@ from numpy.typing import NDArray
 
 from assets.direction import Song as SongBeats
 from assets.direction import stretch
-from assets.graph_path import SOFT_WISH, Catalogue, Direction, path_costs, pins_of, refuse_conflict
-from kernels.graph.costs import PathCosts
+from assets.graph_path import (
+    SOFT_WISH,
+    Catalogue,
+    Direction,
+    path_costs,
+    pins_of,
+    refuse_conflict,
+    strength_price,
+)
 from kernels.graph.path import STEPS, first_beats, more_than_any
 from kernels.graph.pins import Reach, admitted
 from kernels.graph.program import Program
 from kernels.graph.proposals import Proposals
 from kernels.types import Float, Int
 from schemas.pins import PinWish, parse_pin
-from schemas.settings import Settings
+from schemas.settings import PathSettings, Settings
 
 MOST_PROGRAMS = 100
 """Names of a kind that are priced over several intervals, those of the least bound first; the rest are told as such."""
@@ -72,7 +79,7 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
     dg.Failure
         If the pins that are asked for cannot be kept.
     """
-    solved = list(_solved(known, song, path_costs(settings.path), asked))
+    solved = list(_solved(known, song, settings.path, asked))
     if not solved:
         return {"best_cost": None, "labels": [], "styles": [], "clips": [], "out_of_reach": {}}
     most = solved[0][1]
@@ -157,18 +164,20 @@ def _least(through: Float, group: Int, n: int) -> tuple[Float, Int]:
     return least, node
 
 
-def _solved(known: Catalogue, song: SongBeats, costs: PathCosts, asked: Direction) -> Iterator[tuple[Proposals, float]]:
+def _solved(
+    known: Catalogue, song: SongBeats, settings: PathSettings, asked: Direction
+) -> Iterator[tuple[Proposals, float]]:
     """Solve the song as the search would: from first beats, then from any, past the bounds where there is no other way.
 
     The first one is the search's own; those after it are tried for what the ones before cannot have.
     """
-    graph = known.graph
+    graph, costs = known.graph, path_costs(settings)
     n_nodes, n_beats = len(graph.clip_index), len(song.grid_s) - 1
     pins = pins_of(known, song, asked)
     mask = np.ascontiguousarray(np.broadcast_to(known.is_allowed, (n_beats, n_nodes)))
-    wish = None
+    wish = strength_price(known, song, settings)
     if pins and asked.is_soft:
-        wish = np.where(admitted(pins, n_beats, n_nodes), 0.0, SOFT_WISH)
+        wish = wish + np.where(admitted(pins, n_beats, n_nodes), 0.0, SOFT_WISH)
     elif pins:
         refuse_conflict(known, song, pins, asked, costs)
         mask = mask & admitted(pins, n_beats, n_nodes)

@@ -144,11 +144,25 @@ def _provenance(song: Mapping[str, Any], method: str, steps: Choreography, clip:
     return {
         "method": method,
         "song": {"path": song["path"], "sha256": song["source_sha256"]},
+        "outside_warp": outside_warp(steps),
         "licence": licences.report(dict(danced.select("clip_id", "licence").iter_rows())),
         "clips": danced.select(
             "clip_id", "session", "label", "style", "path", pl.col("source_sha256").alias("sha256"), "licence"
         ).to_dicts(),
     }
+
+
+def outside_warp(steps: Choreography) -> list[dict[str, Any]]:
+    """List the steps that leave 0.90 to 1.10 of their clips' own pace."""
+    warp = steps.warp_ratio
+    return [
+        {
+            "song_start_s": round(float(steps.song_start_s[i]), 4),
+            "clip_id": source_clip(steps.clip_id[i]),
+            "warp_ratio": round(float(warp[i]), 4),
+        }
+        for i in np.flatnonzero((warp < 0.90 - 1e-6) | (warp > 1.10 + 1e-6))
+    ]
 
 
 def read_rows(clip: pa.Table) -> pl.DataFrame:

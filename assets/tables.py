@@ -309,7 +309,7 @@ def from_motion_graph_node(
         pa.array([labels[c] for c in graph.clip_index], pa.string()),
         *(
             pa.array(np.zeros(len(graph.time_s)) if values is None else values, pa.float32())
-            for values in (graph.accent, graph.peak_jerk, graph.usual_jerk)
+            for values in (graph.accent, graph.speed, graph.peak_jerk, graph.usual_jerk)
         ),
         pa.array(is_kept),
     ]
@@ -351,6 +351,7 @@ def to_motion_graph(node: pa.Table, edge: pa.Table) -> tuple[MotionGraph, tuple[
         accent=to_numbers(node["accent_score"]).astype(np.float64),
         peak_jerk=to_numbers(node["jerk_m_per_s3"]).astype(np.float64),
         usual_jerk=to_numbers(node["clip_jerk_m_per_s3"]).astype(np.float64),
+        speed=to_numbers(node["speed_m_per_s"]).astype(np.float64),
     )
     return graph, clip_ids
 

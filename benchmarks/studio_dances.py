@@ -21,8 +21,7 @@ from upath import UPath
 from assets import tables
 from assets.dance import load_clips
 from assets.direction import Song
-from assets.graph_path import Catalogue, Direction, by_graph, catalogue, read_clips
-from kernels.assembly.timing import cover
+from assets.graph_path import Catalogue, Direction, by_graph, catalogue, heard_song, read_clips
 from kernels.types import Choreography, Clip, Float
 from pipelines.io_managers import StoredTable
 from pipelines.lake import Lake
@@ -72,7 +71,8 @@ class BuiltStudio:
         """Read the beats of a song."""
         grid = tables.to_music_beat(self._lake.table("music_beat", key))
         duration_s = float(max(self._lake.table("song", key)["duration_s"].to_pylist()))
-        return Song(cover(grid.time_s, duration_s)[0], grid, duration_s)
+        feature, repeat = (self._lake.table(name, key) for name in ("music_feature", "music_repeat"))
+        return heard_song(grid, duration_s, feature=feature, repeat=repeat)
 
     def dance(self, known: Catalogue, key: str) -> Danced:
         """Choose the steps of a song by the graph method."""

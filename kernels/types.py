@@ -165,6 +165,8 @@ class MotionGraph:
         How plainly the body stops at each node, :func:`kernels.motion.velocity.accents`; None where it is not known.
     peak_jerk, usual_jerk : (N,) float64, >= 0, metres per second cubed, or None
         Of the recording around each node, and its clip's usual, :func:`kernels.motion.velocity.jerk_around`.
+    speed : (N,) float64, >= 0, metres per second, or None
+        Mean speed of the joints from each node to the clip's next.
 
     Raises
     ------
@@ -181,10 +183,11 @@ class MotionGraph:
     accent: Float | None = None
     peak_jerk: Float | None = None
     usual_jerk: Float | None = None
+    speed: Float | None = None
 
     def __post_init__(self) -> None:
         n, e = len(self.clip_index), len(self.source)
-        for name in ("peak_jerk", "usual_jerk"):
+        for name in ("peak_jerk", "usual_jerk", "speed"):
             found = getattr(self, name)
             if found is not None and not (found.shape == (n,) and np.isfinite(found).all() and (found >= 0).all()):
                 raise ValueError(f"{name}: want ({n},) finite, >= 0, got {found.shape}")

@@ -5,10 +5,9 @@ from typing import Any
 
 import dagster as dg
 
-from assets import direction, proposals, tables
-from assets.graph_path import catalogue, direction_of, read_clips
+from assets import proposals, tables
+from assets.graph_path import catalogue, direction_of, heard_song, read_clips
 from assets.sources import Request
-from kernels.assembly.timing import cover
 from pipelines.files import StudioError
 from pipelines.outcome import DONE, NOTHING_DONE, Outcome
 from pipelines.resources import StudioFolder
@@ -36,7 +35,8 @@ def propose(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) ->
     if len(beats.time_s) < 2:
         raise StudioError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
     duration_s = float(max(lake.table("song", song)["duration_s"].to_pylist()))
-    played = direction.Song(cover(beats.time_s, duration_s)[0], beats, duration_s)
+    feature, repeat = (lake.table(name, song) for name in ("music_feature", "music_repeat"))
+    played = heard_song(beats, duration_s, feature=feature, repeat=repeat)
     try:
         at = proposals.place_of(place, played)
     except ValueError as error:

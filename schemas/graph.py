@@ -11,7 +11,7 @@ NODE_INDEX = Column("node_index", pa.int32(), "Node of the motion graph, from 0,
 
 MOTION_GRAPH_NODE = Table(
     name="motion_graph_node",
-    version=2,
+    version=3,
     meaning="One beat of one clip as a node of the motion graph.",
     key=("node_index",),
     columns=(
@@ -23,6 +23,7 @@ MOTION_GRAPH_NODE = Table(
         Column("next_node_index", pa.int32(), "The clip's next beat; -1 at its last."),
         Column("label", pa.string(), "Label of the clip."),
         Column("accent_score", pa.float32(), "How plainly the body stops at this beat, 0 to 1."),
+        Column("speed_m_per_s", pa.float32(), "Mean speed of the joints from this beat to the clip's next."),
         Column("jerk_m_per_s3", pa.float32(), "Roughest moment of the clip around this beat."),
         Column("clip_jerk_m_per_s3", pa.float32(), "Its clip's 99th percentile of jerk."),
         Column("is_kept", pa.bool_(), "False where pruning found that a dance could not go on from here."),

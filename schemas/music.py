@@ -91,6 +91,21 @@ MUSIC_SEGMENT = Table(
     ),
 )
 
+MUSIC_REPEAT = Table(
+    name="music_repeat",
+    version=1,
+    meaning="One stretch of a song that plays an earlier one again.",
+    key=("song_id", "repeat_index"),
+    columns=(
+        f.SONG_ID,
+        Column("repeat_index", pa.int32(), "Repeat of its song, from 0."),
+        Column("start_s", pa.float64(), "Start of the later stretch: a beat."),
+        Column("end_s", pa.float64(), "End of the later stretch: a beat."),
+        Column("source_start_s", pa.float64(), "Start of the earlier stretch: a beat."),
+        Column("likeness_score", pa.float32(), "Mean likeness of its beats to the earlier ones, at most 1."),
+    ),
+)
+
 PERCUSSION = Table(
     name="percussion",
     version=1,

@@ -97,6 +97,13 @@ class PathSettings(_Checked):
     transition_weight: float = key(1.0, "Weight of seams, by pose distance.", least=0)
     warp_weight: float = key(1.0, "Weight of leaving a clip's own pace.", least=0)
     repetition_weight: float = key(1.0, "Weight of showing again what was shown.", least=0)
+    intensity_weight: float = key(2.0, "Weight of movement unlike the music in strength.", least=0)
+    seam_cost: float = key(1.0, "Price of any seam: more makes phrases longer.", least=0)
+    repeat: str = key(
+        "none",
+        "'structure': where the song plays a part again, its dance is danced again; 'none': each part has its own.",
+        values=("none", "structure"),
+    )
     beat_weight: float = key(1.0, "Weight of beats on which the body does not visibly stop.", least=0)
 
 

@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import spearmanr
 
 from kernels.assembly.blend import Dance
-from kernels.motion.velocity import kinematic_beats
+from kernels.motion.velocity import kinematic_beats, speed_between
 from kernels.types import Choreography, Float
 
 
@@ -145,6 +146,31 @@ def beat_measures(dance: Dance, music_beat_s: Float, *, seed: int = 0, n_shifts:
         ),
         Measure("beat_p_probability", p, "below 0.01", p < 0.01),
     ]
+
+
+def intensity_measures(dance: Dance, music: Float, grid_s: Float) -> list[Measure]:
+    """Report whether strong music is danced with much movement: ranks, so that order counts and not size.
+
+    Parameters
+    ----------
+    dance : Dance
+    music : (K,) float, how strong the music is between the beats
+    grid_s : (K + 1,) float, seconds, the beats
+
+    Returns
+    -------
+    list of Measure
+        Spearman's rank correlation with the mean speed of the joints between the beats, -1 to 1; 0 where either does
+        not change, and for fewer than three intervals inside the dance.
+    """
+    inside = (grid_s[:-1] >= 0) & (grid_s[1:] <= (dance.time_s[-1] if len(dance.time_s) else 0.0))
+    found = 0.0
+    if inside.sum() > 2:
+        moved = speed_between(dance.position_xyz_m, dance.frame_rate_hz, time_s=np.maximum(grid_s, 0.0))[:-1][inside]
+        heard = music[inside]
+        if np.ptp(moved) > 0 and np.ptp(heard) > 0:
+            found = float(spearmanr(moved, heard).statistic)
+    return [Measure("intensity_rank_correlation_ratio", found)]
 
 
 def lag_measures(dance: Dance, steps: Choreography, music_beat_s: Float) -> list[Measure]:

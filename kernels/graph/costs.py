@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import rankdata
 
 from kernels.types import Float, Int, MotionGraph
 
@@ -176,6 +177,27 @@ def rough_cost(graph: MotionGraph, costs: PathCosts) -> Float:
     is_rough = (peak > usual) & (usual > 0)
     doublings = np.log2(np.where(is_rough, peak, 1.0) / np.where(is_rough, usual, 1.0))
     return np.asarray(costs.rough * doublings**2, np.float64)
+
+
+def intensity_price(music: Float, graph: MotionGraph, *, weight: float) -> Float:
+    """Price of dancing strong music with little movement, and weak music with much (ours).
+
+    Parameters
+    ----------
+    music : (K,) float, how strong each music interval is, in any unit
+    graph : MotionGraph of N nodes
+    weight : float, >= 0
+
+    Returns
+    -------
+    (K, N) float64, 0 to ``weight``
+        ``weight`` times the squared difference of the ranks, 0 to 1: of the interval in the song, of the movement after
+        the node in the catalogue. Zeros where the nodes' speeds are not known.
+    """
+    if graph.speed is None or not len(music) or not len(graph.speed):
+        return np.zeros((len(music), len(graph.clip_index)))
+    ranks = [(rankdata(values) - 0.5) / len(values) for values in (music, graph.speed)]
+    return np.asarray(weight * np.subtract.outer(*ranks) ** 2, np.float64)
 
 
 def jump_back_cost(graph: MotionGraph, costs: PathCosts) -> Float:

@@ -206,3 +206,32 @@ def jerk_around(
     first, last = np.searchsorted(middle, time_s - reach_s), np.searchsorted(middle, time_s + reach_s, side="right")
     peak = np.array([found[a:b].max(initial=0.0) for a, b in zip(first, last, strict=True)]).reshape(-1)
     return peak, float(np.percentile(found, 99))
+
+
+def speed_between(position_m: Float, frame_rate_hz: float, *, time_s: Float) -> Float:
+    """Mean speed of the joints from each moment to the next.
+
+    Parameters
+    ----------
+    position_m : (F, J, 3) float, metres, world
+    frame_rate_hz : float, > 0
+    time_s : (B,) float, seconds from the first frame, increasing
+
+    Returns
+    -------
+    (B,) float64, metres per second
+        The last has the value of the one before it; of a single moment, the mean over the clip.
+
+    Raises
+    ------
+    ValueError
+        As :func:`mean_speed`.
+    """
+    speed = mean_speed(position_m, frame_rate_hz, smoothing_s=0)
+    if len(time_s) < 2:
+        return np.full(len(time_s), speed.mean() if len(speed) else 0.0)
+    total = np.append(0.0, np.cumsum(speed))
+    edge = np.clip(np.rint(np.asarray(time_s) * frame_rate_hz).astype(np.int64), 0, max(len(speed) - 1, 0))
+    after = np.maximum(edge[1:], edge[:-1] + 1)
+    between = (total[after] - total[edge[:-1]]) / (after - edge[:-1])
+    return np.append(between, between[-1])

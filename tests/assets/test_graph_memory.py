@@ -29,7 +29,7 @@ def beats(name, version="1"):
     time_s = np.arange(1, 8) * 0.5
     features = beat_features(made.clip.rotation_wxyz, position, frame_rate_hz=made.clip.frame_rate_hz, time_s=time_s)
     ones = np.ones(len(time_s))
-    return Beats(name, version, made.clip.duration_s, time_s, features, 0.5 * ones, 2 * ones, ones)
+    return Beats(name, version, made.clip.duration_s, time_s, features, 0.5 * ones, 2 * ones, ones, ones)
 
 
 def listed(clips, earlier=None):

@@ -29,5 +29,12 @@ def test_retarget_one(built, tmp_path):
     assert not [f for f in usd_check.check(tmp_path / "step.usdc") if f.severity == "error"]
 
 
+def test_seam_strips(built, tmp_path):
+    done = run("seam_strips.py", built / "dances" / "beat" / "graph.usdc", tmp_path / "strips.png")
+    assert done.returncode == 0, done.stderr
+    assert "seams; strips in" in done.stdout
+    assert (tmp_path / "strips.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_without_arguments_they_say_what_they_want():
     assert "STUDIO SONG" in run("where_from.py").stderr

@@ -128,3 +128,16 @@ def test_a_still_dance_has_no_beats(clips, phrases, dance):
     steps = phrases(("idle", 0.25, 6, 0.5, 0.5))
     made = assemble(steps, still, skeleton=CANONICAL, frame_rate_hz=30.0, duration_s=3.0)
     assert values(quality.beat_measures(made, np.arange(0, 3, 0.5)))["beat_p_probability"] > 0.01
+
+
+def test_movement_that_follows_the_music_correlates_by_rank(clips):
+    position = np.zeros((301, 2, 3))
+    speed = np.repeat([0.1, 0.5, 0.2, 0.9, 0.4, 0.6, 0.3, 0.8, 0.05, 0.7], 30)
+    position[1:, :, 0] = np.cumsum(speed)[:, None] / 30
+    made = type("Moved", (), {"position_xyz_m": position, "frame_rate_hz": 30.0, "time_s": np.arange(301) / 30})()
+    music = np.array([1, 5, 2, 10, 4, 6, 3, 9, 0, 7.0]) ** 3
+    grid_s = np.arange(11.0)
+    assert values(quality.intensity_measures(made, music, grid_s))["intensity_rank_correlation_ratio"] > 0.99
+    assert values(quality.intensity_measures(made, -music, grid_s))["intensity_rank_correlation_ratio"] < -0.99
+    assert values(quality.intensity_measures(made, np.ones(10), grid_s))["intensity_rank_correlation_ratio"] == 0
+    assert values(quality.intensity_measures(made, music[:2], grid_s[:3]))["intensity_rank_correlation_ratio"] == 0

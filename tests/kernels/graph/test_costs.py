@@ -5,6 +5,7 @@ import pytest
 
 from kernels.graph.costs import (
     PathCosts,
+    intensity_price,
     is_within,
     jump_back_cost,
     rough_cost,
@@ -106,3 +107,13 @@ def test_roughness_not_known_or_nowhere_costs_nothing(make_graph):
     still = replace(graph, peak_jerk=np.zeros(6), usual_jerk=np.zeros(6))
     np.testing.assert_array_equal(rough_cost(still, PathCosts()), 0)
     assert len(rough_cost(make_graph([[0, 1]]), PathCosts())) == 0
+
+
+def test_strong_music_wants_much_movement(make_graph):
+    graph = make_graph([[0, 1], [0, 1]])
+    np.testing.assert_array_equal(intensity_price(np.ones(3), graph, weight=1.0), np.zeros((3, 4)))
+    moving = replace(graph, speed=np.array([0.1, 0.2, 0.3, 4.0]))
+    price = intensity_price(np.array([9.0, 1.0]), moving, weight=2.0)
+    rank = (np.arange(4) + 0.5) / 4
+    np.testing.assert_allclose(price, 2 * np.stack([(0.75 - rank) ** 2, (0.25 - rank) ** 2]))
+    np.testing.assert_array_equal(price, intensity_price(np.array([2.0, 0.5]), moving, weight=2.0))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.motion.velocity import accents, jerk, jerk_around, kinematic_beats, mean_speed
+from kernels.motion.velocity import accents, jerk, jerk_around, kinematic_beats, mean_speed, speed_between
 
 
 @pytest.fixture
@@ -107,3 +107,12 @@ def test_jerk_around_nothing():
     assert (len(peak), usual) == (0, 0.0)
     with pytest.raises(ValueError, match="frame_rate_hz"):
         jerk_around(np.zeros((90, 1, 3)), 0.0, time_s=np.zeros(0))
+
+
+def test_speed_between_moments_of_a_body_that_speeds_up():
+    position = np.zeros((121, 3, 3))
+    position[:, :, 0] = (np.arange(121) / 30)[:, None] ** 2 / 2
+    found = speed_between(position, 30.0, time_s=np.array([0.0, 1.0, 2.0, 4.0]))
+    np.testing.assert_allclose(found, [0.5, 1.5, 3.0, 3.0], atol=0.03)
+    assert len(speed_between(position, 30.0, time_s=np.zeros(0))) == 0
+    assert speed_between(position, 30.0, time_s=np.array([1.0]))[0] == pytest.approx(2.0, abs=0.03)

@@ -1,0 +1,75 @@
+"""Parts that come again are danced again, where they can be, and never against a pin."""
+
+import numpy as np
+import pytest
+
+from kernels.graph.costs import PathCosts
+from kernels.graph.path import find_path
+from kernels.graph.pins import Pin, Reach, admitted
+from kernels.graph.structure import FREE_BEATS, node_of_interval, structure_pins
+from kernels.music.repeats import Repeat
+
+BEAT_S = 0.5 * np.arange(41)
+CHORUS = Repeat(28, 40, 8, 0.9)
+
+
+@pytest.fixture
+def joined(make_graph):
+    """Four clips of thirty beats; from every beat of the one there is a way to some of the next."""
+    beats = [0.5 * np.arange(30) for _ in range(4)]
+    doors = (2, 6, 10, 14, 18)
+    pairs = [(30 * c + b, 30 * ((c + 1) % 4) + door, 1.0) for c in range(4) for b in range(1, 29) for door in doors]
+    graph = make_graph(beats, pairs)
+    return graph, Reach(graph, BEAT_S, costs=PathCosts(), starts=np.arange(120))
+
+
+def danced(graph, pins):
+    return find_path(graph, BEAT_S, starts="any", admissible=admitted(pins, 40, 120) if pins else None)
+
+
+def same(path):
+    node = node_of_interval(path)
+    k = np.arange(CHORUS.first + FREE_BEATS, CHORUS.last - FREE_BEATS)
+    return node[k] == node[k - CHORUS.first + CHORUS.source]
+
+
+def test_a_chorus_is_danced_again(joined):
+    graph, reach = joined
+    first = danced(graph, [])
+    assert not same(first).all()
+    pins, n_held = structure_pins(first, [CHORUS], reach)
+    assert n_held == 1
+    again = danced(graph, pins)
+    assert same(again).all()
+    k = np.arange(CHORUS.source + FREE_BEATS, CHORUS.source + 12 - FREE_BEATS)
+    np.testing.assert_array_equal(node_of_interval(again)[k], node_of_interval(first)[k])
+
+
+def test_pins_come_first(joined):
+    graph, reach = joined
+    wish = Pin("there", 30, 33, np.arange(120) // 30 == 2)
+    first = danced(graph, [wish])
+    pins, n_held = structure_pins(first, [CHORUS], reach, kept=[wish])
+    assert n_held == 1
+    assert not {30, 31, 32, 10, 11, 12} & {pin.first for pin in pins}
+    again = danced(graph, [wish, *pins])
+    assert (node_of_interval(again)[30:33] // 30 == 2).all()
+
+
+def test_what_cannot_be_danced_again_is_left(make_graph):
+    graph = make_graph([0.5 * np.arange(60)])
+    reach = Reach(graph, BEAT_S, costs=PathCosts(), starts=np.arange(60))
+    first = find_path(graph, BEAT_S, starts="any")
+    assert structure_pins(first, [CHORUS], reach) == ([], 0)
+
+
+def test_no_repeats_no_pins(joined):
+    graph, reach = joined
+    assert structure_pins(danced(graph, []), [], reach) == ([], 0)
+
+
+def test_steps_over_two_intervals_have_their_node_in_both(make_graph):
+    graph = make_graph([np.arange(30) * 1.0])
+    path = find_path(graph, 0.5 * np.arange(9))
+    assert (path.beat_span == 2).all()
+    np.testing.assert_array_equal(node_of_interval(path), np.repeat(path.source_node, 2))
