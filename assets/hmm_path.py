@@ -186,7 +186,8 @@ def choose_states(
             else best_spans(*chain)[0]
         )
     except InfeasibleSpansError as error:
-        raise dg.Failure(_no_length(error, grid_s, lengths[known], parts), allow_retries=False) from error
+        # What is told is the innermost cause, and this one says more.
+        raise dg.Failure(_no_length(error, grid_s, lengths[known], parts), allow_retries=False) from None
     before = np.append(0, spans.state[:-1])
     log_model = np.where(spans.start == 0, model.log_initial[spans.state], model.log_transition[before, spans.state])
     log_model = log_model + log_duration[spans.start, spans.length - 1, spans.state]

@@ -47,7 +47,7 @@ def dance_notes(report: dict[str, Any]) -> list[str]:
             "motions as long as the song's beats ask for are few: they are danced beyond 0.90 to 1.10 of their pace; "
             "add clips danced near its tempo, or set beats.octave in its brief"
         )
-    if _failed(wanted, "beat_p_probability"):
+    if _failed(wanted, "beat_p_probability") or _failed(wanted, "beat_f_p_probability"):
         notes.append("too short, or moving too evenly, for its beats to be told from chance by an independent eye")
     if _failed(wanted, "seam_jerk_ratio") and wanted["seam_jerk_ratio"]["value"] <= 1.5:
         notes.append(
