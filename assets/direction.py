@@ -54,7 +54,7 @@ class Nodes:
     def wished(self, wish: PinWish) -> NDArray[np.bool_]:
         """Find the nodes that a wish admits, (N,) bool."""
         if wish.clip:
-            return np.asarray(self.clip_id == wish.clip)
+            return np.isin(self.clip_id, wish.clips)
         if wish.style:
             return np.asarray(self.style == wish.style)
         if wish.not_label:

@@ -74,13 +74,8 @@ def load_dancer(
         )
     every = hmm_tables.all_motions(key_pose.read(key) for key in key_pose.keys)
     subject = settings.choreography_model.subject
-    free = {
-        row["clip_id"]
-        for row in clips.iter_rows(named=True)
-        if licences.is_allowed(row["licence"], allow)
-        and not licences.terms_of(row["licence"]).no_derivatives
-        and (not subject or row["subject"] == subject)
-    }
+    own = clips.filter(pl.col("subject") == subject) if subject else clips
+    free = licences.free_to_join(dict(own.select("clip_id", "licence").iter_rows()), allow)
     usable = {clip: motions for clip, motions in every.items() if clip in free}
     if not any((m.state >= 0).any() for m in usable.values()):
         why = (

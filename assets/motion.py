@@ -30,7 +30,7 @@ from kernels.motion.features import contacts_at_feature_rate, motion_features
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.retarget import retarget
-from schemas.hmm import KEY_POSE
+from schemas.hmm import BASIC_MOTION, KEY_POSE
 from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE
 from schemas.settings import FeatureSettings, MotionBeatSettings
 
@@ -149,8 +149,11 @@ def key_pose(
 ) -> Parts:
     """Cut every clip into motions with three key poses each, and tell of which kind each is."""
     settings = studio.settings().basic_motion
-    states = hmm_tables.to_states(basic_motion.read())
-    code = version_of(code_version(context, KEY_POSE.name), repr(settings), basic_motion.stamp().content)
+    # Started by hand before there are kinds of motions: cut all the same, of no kind.
+    is_there = bool(basic_motion.keys)
+    states = hmm_tables.to_states(basic_motion.read() if is_there else BASIC_MOTION.empty())
+    kinds = basic_motion.stamp().content if is_there else ""
+    code = version_of(code_version(context, KEY_POSE.name), repr(settings), kinds)
 
     def session(key: str) -> Part:
         poses = tables.by_clip(canonical_pose.read(key))

@@ -22,8 +22,12 @@ from kernels.graph.path import STEPS, first_beats, more_than_any
 from kernels.graph.pins import Reach, admitted
 from kernels.graph.program import Program
 from kernels.graph.proposals import Proposals
+from kernels.types import Float, Int
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import PathSettings, Settings
+
+MOST_PROGRAMS = 100
+"""Names of a kind that are priced over several intervals, those of the least bound first; the rest are told as such."""
 
 KINDS = ("label", "style", "clip")
 _PREFIX = {"label": "", "style": "style:", "clip": "clip:"}
@@ -66,8 +70,9 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
     dict
         ``best_cost``, and ``labels``, ``styles`` and ``clips``, the cheapest first: name, the pin to write,
         ``extra_cost`` over the best dance with the pins that are asked for already, and how many clips it has there;
-        ``out_of_reach``, names by kind. Costs are those of the dynamic program: exact, all but the price of showing the
-        same again over the whole song.
+        ``out_of_reach``, names by kind; ``unpriced_clips`` and the like where a stretch has more than
+        :data:`MOST_PROGRAMS` candidates. Costs are those of the dynamic program: exact, all but the price of showing
+        the same again over the whole song.
 
     Raises
     ------
@@ -80,55 +85,83 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
     most = solved[0][1]
     found: dict[str, Any] = {"best_cost": solved[0][0].best_cost % most, "out_of_reach": {}}
     for kind in KINDS:
-        names = getattr(known.nodes, "clip_id" if kind == "clip" else kind)
-        rows, lost = [], []
-        for name in np.unique(names[known.is_allowed]).tolist():
-            if not name:
-                continue
-            nodes = (names == name) & known.is_allowed
-            priced = _price(solved, place, nodes)
-            if priced is None:
-                lost.append(name)
-                continue
-            cost, outside, best_node = priced
-            rows.append(
-                {
-                    kind: name,
-                    "pin": f"{place.place}={_PREFIX[kind]}{name}",
-                    "extra_cost": cost - found["best_cost"],
-                    "steps_outside_warp_bounds": outside,
-                    **_facts(known, nodes, best_node, kind),
-                }
-            )
+        every = getattr(known.nodes, "clip_id" if kind == "clip" else kind)
+        names, first, group = np.unique(every, return_index=True, return_inverse=True)
+        is_named = (names != "") & (np.bincount(group, known.is_allowed, minlength=len(names)) > 0)
+        prices = _price(solved, place, group, len(names), is_named)
+        rows = [
+            {
+                kind: str(names[i]),
+                "pin": f"{place.place}={_PREFIX[kind]}{names[i]}",
+                "extra_cost": float(prices.cost[i] % most) - found["best_cost"],
+                "steps_outside_warp_bounds": int(prices.cost[i] // most),
+                **(
+                    _of_clip(known, first[i], prices.node[i])
+                    if kind == "clip"
+                    else _of_many(known, group == i, prices.node[i])
+                ),
+            }
+            for i in np.flatnonzero(is_named & np.isfinite(prices.cost)).tolist()
+        ]
         found[f"{kind}s"] = sorted(rows, key=lambda row: (row["steps_outside_warp_bounds"], row["extra_cost"]))
-        found["out_of_reach"][f"{kind}s"] = lost
+        found["out_of_reach"][f"{kind}s"] = names[is_named & np.isinf(prices.cost) & ~prices.is_left].tolist()
+        found[f"unpriced_{kind}s"] = names[prices.is_left].tolist()
     return found
 
 
-def _facts(known: Catalogue, nodes: NDArray[np.bool_], best: int | None, kind: str) -> Mapping[str, Any]:
-    if kind == "clip":
-        label, style = known.nodes.label[nodes][0], known.nodes.style[nodes][0]
-        at_s = {} if best is None else {"clip_time_s": float(known.graph.time_s[best])}
-        return {"label": str(label), "style": str(style), **at_s}
-    cheapest = {} if best is None else {"cheapest_clip": str(known.nodes.clip_id[best])}
+def _of_clip(known: Catalogue, node: int, best: int) -> Mapping[str, Any]:
+    at_s = {} if best < 0 else {"clip_time_s": float(known.graph.time_s[best])}
+    return {"label": str(known.nodes.label[node]), "style": str(known.nodes.style[node]), **at_s}
+
+
+def _of_many(known: Catalogue, nodes: NDArray[np.bool_], best: int) -> Mapping[str, Any]:
+    cheapest = {} if best < 0 else {"cheapest_clip": str(known.nodes.clip_id[best])}
     return {"clip_count": len(np.unique(known.nodes.clip_id[nodes])), **cheapest}
 
 
+@dataclass(frozen=True, eq=False)
+class _Prices:
+    """Of each name: cost, infinite where out of reach; first node, -1 where not known; whether it was not looked at."""
+
+    cost: Float
+    node: Int
+    is_left: NDArray[np.bool_]
+
+
 def _price(
-    solved: list[tuple[Proposals, float]], place: Asked, nodes: NDArray[np.bool_]
-) -> tuple[float, int, int | None] | None:
-    """Cost of dancing nodes at a place, steps outside the bounds, and where it begins; None where there is no way."""
-    for proposals, most in solved:
-        best = None
+    solved: list[tuple[Proposals, float]], place: Asked, group: Int, n: int, is_named: NDArray[np.bool_]
+) -> _Prices:
+    """Price dancing the nodes of each group at a place, by the first of the solved songs that can.
+
+    Over several intervals each group takes a program of its own; the cheapest step in each interval is a bound that
+    says which are worth it.
+    """
+    prices = _Prices(np.full(n, np.inf), np.full(n, -1), np.zeros(n, bool))
+    for proposals, _ in solved:
+        todo = is_named & np.isinf(prices.cost)
+        bound = np.zeros(n)
+        for interval in range(place.first, place.last):
+            least, node = _least(proposals.through(interval), group, n)
+            bound = np.maximum(bound, least)
         if place.last == place.first + 1:
-            through = proposals.through(place.first, nodes)
-            best = int(np.argmin(through))
-            cost = float(through[best])
-        else:
-            cost = proposals.within(place.first, place.last, nodes)
-        if np.isfinite(cost):
-            return cost % most, int(cost // most), best
-    return None
+            prices.cost[todo], prices.node[todo] = bound[todo], node[todo]
+            continue
+        likely = np.flatnonzero(todo & np.isfinite(bound))
+        likely = likely[np.argsort(bound[likely], kind="stable")]
+        for i in likely[:MOST_PROGRAMS].tolist():
+            prices.cost[i] = proposals.within(place.first, place.last, group == i)
+        prices.is_left[likely[MOST_PROGRAMS:]] = True
+    prices.is_left[np.isfinite(prices.cost)] = False
+    return prices
+
+
+def _least(through: Float, group: Int, n: int) -> tuple[Float, Int]:
+    """Least cost of each group, (n,), and its first node, -1 for none."""
+    order = np.lexsort((np.arange(len(group)), through, group))
+    least, node = np.full(n, np.inf), np.full(n, -1)
+    of, first = np.unique(group[order], return_index=True)
+    least[of], node[of] = through[order[first]], order[first]
+    return least, node
 
 
 def _solved(

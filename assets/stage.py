@@ -51,7 +51,7 @@ class Stage:
 @table_asset(
     USD_ANIMATION,
     group="dance",
-    code_version="2",
+    code_version="3",
     sources="character",
     partitions=DANCE,
     ins={name: _EVERY_CLIP for name in ("clip", "skeleton", "pose")},
@@ -196,8 +196,10 @@ def lineage_of(frames: pa.Table, choreography: pa.Table) -> dict[str, Any]:
     return {
         "odori:clip": frames["clip_id"].to_pylist(),
         "odori:clipTime": tables.to_numbers(frames["clip_time_s"]),
+        "odori:mirrored": frames["is_mirrored"].to_pylist(),
         "odori:blendClip": [partner or "" for partner in frames["blend_clip_id"].to_pylist()],
         "odori:blendTime": np.nan_to_num(frames["blend_time_s"].to_numpy().astype(np.float64)),
+        "odori:blendMirrored": frames["is_blend_mirrored"].to_pylist(),
         "odori:blendWeight": tables.to_numbers(frames["blend_weight_ratio"]),
         "odori:warp": tables.to_numbers(frames["warp_ratio"]),
         "odori:step": [told[i] for i in step.tolist()],

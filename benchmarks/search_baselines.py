@@ -19,30 +19,27 @@ def mean_and_deviation(motions: Sequence[NDArray[np.float64]]) -> NDArray[np.flo
 
 
 def warped(queries: Sequence[NDArray[np.float64]], motions: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Distances by dynamic time warping over root-relative poses, a step of the path: (Q, N)."""
-    flat = [
-        [np.ascontiguousarray(normalise(m, per_frame=True)[::STEP].reshape(-1, m.shape[1] * 3)) for m in group]
-        for group in (queries, motions)
-    ]
+    """Distances by dynamic time warping over poses about the root, facing as in the first frame: (Q, N)."""
+    flat = [[_poses(motion) for motion in group] for group in (queries, motions)]
     return np.array([[_warp(a, b) for b in flat[1]] for a in flat[0]])
+
+
+def _poses(motion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Root-relative poses that keep their turning: with each frame faced alike, the warping finds far less."""
+    path = normalise(motion)[::STEP]
+    return np.ascontiguousarray((path - path[:, :1] * np.array([1.0, 0.0, 1.0])).reshape(len(path), -1))
 
 
 @numba.njit(cache=True)
 def _warp(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Cost of the cheapest path over n + m: over the path's own length, detours would make it cheaper."""
     n, m = len(a), len(b)
     total = np.full((n + 1, m + 1), np.inf)
-    steps = np.zeros((n + 1, m + 1))
     total[0, 0] = 0.0
     for i in range(1, n + 1):
         for j in range(1, m + 1):
             cost = 0.0
             for k in range(a.shape[1]):
                 cost += (a[i - 1, k] - b[j - 1, k]) ** 2
-            best, pi, pj = total[i - 1, j - 1], i - 1, j - 1
-            if total[i - 1, j] < best:
-                best, pi, pj = total[i - 1, j], i - 1, j
-            if total[i, j - 1] < best:
-                best, pi, pj = total[i, j - 1], i, j - 1
-            total[i, j] = best + np.sqrt(cost)
-            steps[i, j] = steps[pi, pj] + 1
-    return total[n, m] / steps[n, m]
+            total[i, j] = np.sqrt(cost) + min(total[i - 1, j - 1], total[i - 1, j], total[i, j - 1])
+    return total[n, m] / (n + m)

@@ -22,6 +22,7 @@ from pipelines.files import LakeError, StudioError
 from pipelines.freshness import Freshness
 from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
 from pipelines.resources import StudioFolder
+from pipelines.search import by_likeness
 from pipelines.status import any_read, clips_of, counts, refusals, songs_of
 from pipelines.web import existing
 from schemas.pins import parse_pin
@@ -145,7 +146,9 @@ def dance(
         raise StudioError(f"--method: want one of {', '.join(METHODS)}, got {method!r}")
     if out is not None:
         dancing.check_out(out)
-    pins = _pin_texts(pins)
+    pins = _pin_texts(pins, root, progress)
+    if temperature is not None and not 0 <= temperature <= 10:
+        raise StudioError(f"--temperature: want 0 to 10, got {temperature:g}")
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
     work = Session(studio, progress)
@@ -155,6 +158,8 @@ def dance(
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
     methods = {song.key: _ways(method or _briefed_method(studio, song), alternatives) for song in songs}
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
+    if temperature is not None and not any(key.endswith("|hmm") for key in keys):
+        raise StudioError("--temperature: want the method hmm, which draws dances, got another; add --method hmm")
     before = studio.requests()
     for key in sorted(keys):
         studio.remember(key, Request(frame_rate_hz or 0.0, pins, character, temperature, seed))
@@ -197,7 +202,7 @@ def propose(
 ) -> Outcome:
     """List what could be pinned at a place of a song, building first what that takes; nothing is danced."""
     studio = existing(root)
-    pins = _pin_texts(pins)
+    pins = _pin_texts(pins, root, progress)
     work = Session(studio, progress)
     songs = _wanted(work.state, [wanted], studio)
     if len(songs) > 1:
@@ -211,10 +216,11 @@ def propose(
         raise StudioError("; ".join([str(error), *report.failed])) from error
 
 
-def _pin_texts(pins: Sequence[str]) -> tuple[str, ...]:
-    """Check pins of the command line; StudioError says what a pin looks like."""
+def _pin_texts(pins: Sequence[str], root: Path, progress: Callable[[], Any]) -> tuple[str, ...]:
+    """Check pins of the command line, those by likeness turned into clips; StudioError says what a pin looks like."""
+    named = [by_likeness(root, text, progress=progress) for text in pins]
     try:
-        return tuple(dict.fromkeys(parse_pin(text).text for text in pins))
+        return tuple(dict.fromkeys(parse_pin(text).text for text in named))
     except ValueError as error:
         raise StudioError(f"--pin: {error}") from error
 

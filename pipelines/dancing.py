@@ -14,6 +14,7 @@ from assets.graph_path import direction_of
 from assets.partitions import alternative_number, base_method
 from assets.stage import COSTS
 from kernels.assembly.timing import cover
+from pipelines import hmm_report
 from pipelines.files import StudioError, write_beside
 from pipelines.resources import StudioFolder
 from schemas.choreography import CHOREOGRAPHY
@@ -46,6 +47,9 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
         "character": report["provenance"].get("character"),
         "pins": _pin_facts(studio, song, method, steps),
     }
+    if method == "hmm":
+        model = hmm_report.model_facts(studio.lake)
+        facts["model"] = model | {"notes": [*model["notes"], *hmm_report.dance_notes(report)]}
     if alternative_number(method) > 1:
         facts |= _difference(studio, song, base_method(method), steps)
     return facts
@@ -64,9 +68,10 @@ def _difference(studio: StudioFolder, song: str, best: str, steps: pl.DataFrame)
     )
     n = min(len(frames), len(other))
     frames, other = frames.head(n), other.head(n)
-    is_same = (frames["clip_id"] == other["clip_id"]) & ((frames["clip_time_s"] - other["clip_time_s"]).abs() < NEAR_S)
-    shown = set(zip(other["clip_id"], _cell(other), strict=True))
-    is_shared = [moment in shown for moment in zip(frames["clip_id"], _cell(frames), strict=True)]
+    is_near = (frames["clip_time_s"] - other["clip_time_s"]).abs() < NEAR_S
+    is_same = (frames["clip_id"] == other["clip_id"]) & (frames["is_mirrored"] == other["is_mirrored"]) & is_near
+    shown = set(_moments(other))
+    is_shared = [moment in shown for moment in _moments(frames)]
     clips = set(steps["clip_id"])
     return {
         "same_ratio": int(is_same.sum()) / max(n, 1),
@@ -79,8 +84,10 @@ NEAR_S = 0.1
 """Moments of a clip no further apart count as the same."""
 
 
-def _cell(frames: pl.DataFrame) -> pl.Series:
-    return (frames["clip_time_s"] / NEAR_S).round().cast(pl.Int64)
+def _moments(frames: pl.DataFrame) -> list[tuple[str, bool, int]]:
+    """Name what each frame shows: clip, mirrored or not, moment."""
+    cell = (frames["clip_time_s"] / NEAR_S).round().cast(pl.Int64)
+    return list(zip(frames["clip_id"], frames["is_mirrored"], cell, strict=True))
 
 
 def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame) -> list[dict[str, Any]]:
@@ -144,6 +151,8 @@ def report_of(facts: dict[str, Any]) -> str:
     ]
     if facts["not_as_wanted"]:
         lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")
+    if "model" in facts:
+        lines += hmm_report.report_lines(facts["model"])
     return "\n".join(lines)
 
 

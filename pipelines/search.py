@@ -34,6 +34,8 @@ from schemas.search import MOTION_EMBEDDING, MOTION_ENCODER, MOTION_INDEX
 
 _RANGE = re.compile(r"(?P<name>.+)@(?P<start>\d+(?:\.\d*)?|\.\d+)-(?P<end>\d+(?:\.\d*)?|\.\d+)")
 _SEEN = "seen.json"
+PINNED_BY_LIKENESS = 5
+"""Clips most like one that a pin by likeness admits beside it."""
 _MADE_FROM = ("clip", "canonical_pose", MOTION_ENCODER.name, MOTION_EMBEDDING.name)
 
 
@@ -129,6 +131,7 @@ def search(
     took_s = time.perf_counter() - begun
     facts = {
         "query": wish.query,
+        "clip_id": query.clip_id if query else "",
         "like": list(wish.like),
         "unlike": list(wish.unlike),
         "hits": [_hit_facts(index.rows, hit) for hit in found],
@@ -141,6 +144,31 @@ def search(
         _draw(sheet, catalogue, query or like[0], found)
         facts["sheet"] = str(sheet)
     return Outcome(DONE, facts, _report(facts, wish))
+
+
+def by_likeness(root: Path, pin: str, *, progress: Callable[[], Any]) -> str:
+    """Write a pin ``PLACE=like:KEY`` as one of the clip and those most like it; other pins stay as they are.
+
+    The clips are named when the pin is asked for, so that a nightly rebuild dances the same.
+
+    Parameters
+    ----------
+    root : the studio
+    pin : as on the command line
+    progress : makes the bar of long steps
+
+    Raises
+    ------
+    StudioError
+        As :func:`search`.
+    """
+    place, _, wish = pin.partition("=")
+    if not wish.strip().startswith("like:"):
+        return pin
+    name = wish.partition(":")[2].strip()
+    found = search(root, Wish(query=name, k=PINNED_BY_LIKENESS), progress=progress).facts
+    own = [found["clip_id"]] if found["clip_id"] else []
+    return f"{place.strip()}=clip:{','.join([*own, *(hit['clip_id'] for hit in found['hits'])])}"
 
 
 def _find(

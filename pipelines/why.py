@@ -72,10 +72,11 @@ def moment(told: Told, at_s: float) -> dict[str, Any]:
         "clip_time_s": round(float(here["odori:clipTime"]), 4),
         **_facts(clip),
         "warp_ratio": round(float(here["odori:warp"]), 4),
-        "is_mirrored": bool(step.get("is_mirrored", False)),
+        "is_mirrored": bool(here["odori:mirrored"]),
         "blend": {
             "clip_id": here["odori:blendClip"] or None,
             "clip_time_s": round(float(here["odori:blendTime"]), 4) if is_blended else None,
+            "is_mirrored": bool(here["odori:blendMirrored"]),
             "weight_ratio": round(float(here["odori:blendWeight"]), 4),
             **(_facts(partner) if is_blended else {}),
         },
@@ -99,7 +100,8 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
         + (f", {facts['label']}" if facts["label"] else "")
         + (f", {facts['style']}" if facts["style"] else ""),
         f"  licence  {facts['licence'] or 'none named: counts as the studio' + chr(39) + 's own'}",
-        f"  blend    {blend['weight_ratio']:.0%} of {blend['clip_id']} at {blend['clip_time_s']:.2f} s, {blend['path']}"
+        f"  blend    {blend['weight_ratio']:.0%} of {blend['clip_id']} at {blend['clip_time_s']:.2f} s"
+        f"{', mirrored' if blend['is_mirrored'] else ''}, {blend['path']}"
         if blend["clip_id"]
         else "  blend    none",
         f"  pace     {facts['warp_ratio']:.3f} of the song's time to the clip's",

@@ -50,7 +50,7 @@ BASIC_MOTION = Table(
         Column("start_s", pa.float64(), "Start in `clip_id` of the motion nearest to the centroid."),
         Column("end_s", pa.float64(), "End of that motion."),
         Column("motion_count", pa.int32(), "Motions the kind was made from."),
-        Column("reach_m", pa.float64(), "95th percentile of their distances from the centroid."),
+        Column("reach_m", pa.float64(), "How far from the centroid 95 in 100 of them lie at most."),
         Column("pose_xyz_m", f.VECTORS, "The centroid: joints at start, peak and end, the start facing +Z."),
     ),
 )

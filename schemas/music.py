@@ -130,6 +130,6 @@ MELODY = Table(
         f.SONG_ID,
         Column("note_index", pa.int32(), "Step of its song, from 0."),
         f.TIME_S,
-        Column("contour_index", pa.int32(), "0 leap down, 1 step down, 2 same, 3 step up, 4 leap up."),
+        Column("contour_index", pa.int32(), "How it goes: 0 leap down, 1 step down, 2 same, 3 step up, 4 leap up."),
     ),
 )

@@ -12,7 +12,8 @@ place           in a brief                 the stretch of the song
 ``start``       ``place = "start"``        the first beat interval; ``end``: the last
 ==============  =========================  ==============================================
 
-Wishes: ``LABEL`` or ``label:LABEL``, ``style:STYLE``, ``clip:KEY``, ``not:LABEL``.
+Wishes: ``LABEL`` or ``label:LABEL``, ``style:STYLE``, ``clip:KEY``, ``not:LABEL``. Several keys of clips are joined by
+commas: any of them. On the command line ``like:KEY`` names the clips most like one.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class PinWish:
     place: str = key("", "'start' or 'end' of the song instead.", values=("", "start", "end"))
     label: str = key("", "Label to be danced.")
     style: str = key("", "Style to be danced.")
-    clip: str = key("", "Clip to be danced, by its key.")
+    clip: str = key("", "Clip to be danced, by its key; of several, joined by commas, any.")
     not_label: str = key("", "Label not to be danced.")
 
     def __post_init__(self) -> None:
@@ -79,10 +80,15 @@ class PinWish:
         short, name = next((s, n) for s, n in _WISHES.items() if getattr(self, n))
         return f"{where}=" + ("" if short == "label" else f"{short}:") + str(getattr(self, name))
 
+    @property
+    def clips(self) -> list[str]:
+        """Keys of the clips wished for."""
+        return [name.strip() for name in self.clip.split(",")] if self.clip else []
+
     def is_kept_by(self, *, clip_id: str, label: str, style: str) -> bool:
         """Whether a clip is what the pin wishes."""
         if self.clip:
-            return clip_id == self.clip
+            return clip_id in self.clips
         if self.style:
             return style == self.style
         return label != self.not_label if self.not_label else label == self.label

@@ -34,8 +34,10 @@ PROVENANCE_KEY = "odori"
 LINEAGE: dict[str, tuple[str, str]] = {
     "odori:clip": ("token", "Clip that the frame shows, the dominant one of a blend."),
     "odori:clipTime": ("float", "Seconds from that clip's first frame."),
+    "odori:mirrored": ("bool", "Whether that clip is shown mirrored, left for right."),
     "odori:blendClip": ("token", "Partner of the blend; empty where unblended."),
     "odori:blendTime": ("float", "Seconds from the partner's first frame; 0 where unblended."),
+    "odori:blendMirrored": ("bool", "Whether the partner is shown mirrored; false where unblended."),
     "odori:blendWeight": ("float", "The partner's share, 0 to 0.5; 0 where unblended."),
     "odori:warp": ("float", "Song time over clip time."),
     "odori:step": ("string", "The step of the choreography, as JSON: its place, pin and costs."),

@@ -18,8 +18,8 @@ from pxr import Sdf, Usd
 
 from schemas import usd as contract
 
-HELD = ("token", "string")
-Frames = Mapping[str, Sequence[str] | NDArray[np.float64]]
+HELD = {"token": str, "string": str, "bool": bool}
+Frames = Mapping[str, Sequence[str] | Sequence[bool] | NDArray[np.float64]]
 
 
 def write_lineage(layer: Sdf.Layer, animation: str, frames: Frames) -> None:
@@ -45,7 +45,7 @@ def write_lineage(layer: Sdf.Layer, animation: str, frames: Frames) -> None:
         spec.documentation = meaning
         values = frames[name]
         for frame in _needed(values, is_held=kind in HELD):
-            value = str(values[frame]) if kind in HELD else float(values[frame])
+            value = HELD.get(kind, float)(values[frame])
             layer.SetTimeSample(spec.path, contract.START_TIME_CODE + frame, value)
 
 
@@ -123,7 +123,7 @@ def _wrong_values(name: str, kind: str, values: Sequence[str | float], clips: Se
             yield f"{name}: want a JSON object, got another text"
 
 
-def _needed(values: Sequence[str] | NDArray[np.float64], *, is_held: bool) -> list[int]:
+def _needed(values: Sequence[str] | Sequence[bool] | NDArray[np.float64], *, is_held: bool) -> list[int]:
     """Frames that must have a sample for every frame to read back as it was."""
     n = len(values)
     changes = [i for i in range(1, n) if values[i] != values[i - 1]]

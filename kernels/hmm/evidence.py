@@ -19,7 +19,8 @@ N_SHUFFLES = 199
 BLOCK = 8
 """Motions of one stretch: what changes more slowly (a verse, a chorus) is kept together when music is shuffled."""
 
-SURE_P = 0.01
+SURE_P, LEAST_GAIN = 0.01, 0.01
+"""Chance below which, and natural log units a motion from which, music is said to add something."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,7 @@ class Evidence:
     @property
     def music_adds(self) -> bool:
         """Whether the music predicts motions, beyond chance and beyond the motion before."""
-        return self.gain > 0 and self.p < SURE_P
+        return self.gain >= LEAST_GAIN and self.p < SURE_P
 
 
 def shuffled_order(n: int, rng: np.random.Generator) -> Int:

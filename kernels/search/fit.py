@@ -18,7 +18,7 @@ from kernels.search.normalise import channels
 from kernels.search.train import Trained, Training
 from kernels.types import Float, Int
 
-LABELLED = {"network": 0.30, "discriminant": 0.68, "principal": 0.02}
+LABELLED = {"network": 0.10, "discriminant": 0.88, "principal": 0.02}
 UNLABELLED = {"network": 0.5, "principal": 0.5}
 _VALIDATION_FOLDS = 6
 _PATIENCE = 3

@@ -100,7 +100,9 @@ def nearest_clips(
     if is_allowed is not None:
         distance[:, ~is_allowed] = np.inf
     score = np.minimum.reduceat(distance, start, axis=1).mean(axis=0)
-    best = np.argsort(score, kind="stable")[: _SPARE * k]
+    n_near = min(_SPARE * k, len(score))
+    near = np.flatnonzero(score <= np.partition(score, n_near - 1)[n_near - 1])
+    best = near[np.argsort(score[near], kind="stable")][:n_near]
     found = [_hit(vector, query, c, start[c], end[c], distance, at) for c in best.tolist() if np.isfinite(score[c])]
     return sorted(found, key=lambda h: (h.distance, h.clip))[:k]
 

@@ -13,7 +13,7 @@ from pipelines import commands
 from pipelines.files import StudioError
 from pipelines.lake import Lake
 from pipelines.resources import NoProgress, StudioFolder
-from pipelines.search import Wish, search
+from pipelines.search import Wish, by_likeness, search
 
 TAKES = ("step", "twist", "wave")
 
@@ -206,3 +206,12 @@ def test_one_unlabelled_clip_of_one_frame_and_another(tmp_path):
     found = ask(root, "clips-still")
     assert clips_of(found) == ["clips-moves"]
     assert np.isfinite(found["hits"][0]["distance"])
+
+
+def test_a_pin_by_likeness_names_the_clip_and_those_like_it(searchable):
+    text = by_likeness(searchable, "12-16=like:day-step_0", progress=NoProgress)
+    place, _, wish = text.partition("=clip:")
+    assert place == "12-16"
+    assert wish.split(",")[0] == "day-step_0"
+    assert wish.split(",")[1:] == clips_of(ask(searchable, "day-step_0", k=5))
+    assert by_likeness(searchable, "12-16=step", progress=NoProgress) == "12-16=step"

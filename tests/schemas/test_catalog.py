@@ -16,6 +16,9 @@ PROMISED = {
     "music_feature": "song_id time_s rhythm intensity",
     "music_segment": "song_id segment_index start_s end_s start_frame_index frame_count",
     "match": "song_id segment_index rank_number clip_id scale_ratio start_frame_index score",
+    "percussion": "song_id time_s key_number velocity",
+    "key_pose": "clip_id start_s peak_s end_s state_index",
+    "choreography_model": "parameter_name state_index target_index probability",
     "choreography": "step_index song_start_s song_end_s clip_id clip_start_s clip_end_s has_seam blend_s warp_ratio "
     "pin_id",
     "frame_lineage": "frame_index time_s clip_id clip_time_s blend_clip_id blend_time_s blend_weight_ratio warp_ratio",

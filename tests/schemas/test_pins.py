@@ -50,3 +50,10 @@ def test_one_place_and_one_wish():
         PinWish(at=1.0, beat=2, label="x")
     with pytest.raises(ValueError, match="label and style"):
         PinWish(at=1.0, label="x", style="y")
+
+
+def test_of_several_clips_any_keeps_the_pin():
+    pin = parse_pin("42=clip:day-a,day-b")
+    assert pin.clips == ["day-a", "day-b"]
+    assert [pin.is_kept_by(clip_id=c, label="x", style="") for c in ("day-b", "day-c")] == [True, False]
+    assert parse_pin(pin.text) == pin

@@ -15,6 +15,8 @@ def frames(n):
     return {
         "odori:clip": ["walk" if one else "spin" for one in first],
         "odori:clipTime": np.where(first, np.arange(n) / 30, 5 + np.arange(n) / 33),
+        "odori:mirrored": [not one for one in first.tolist()],
+        "odori:blendMirrored": [bool(b) and one for one, b in zip(first.tolist(), is_blended.tolist(), strict=True)],
         "odori:blendClip": [
             "" if not b else "spin" if one else "walk" for one, b in zip(first, is_blended, strict=True)
         ],
@@ -50,6 +52,7 @@ def test_samples_lie_where_values_change(stage, swaying):
     animation = opened.GetPrimAtPath(contract.ANIMATION_PATH)
     n = swaying.n_frames
     assert animation.GetAttribute("odori:clip").GetTimeSamples() == [0, n // 2]
+    assert animation.GetAttribute("odori:mirrored").GetTimeSamples() == [0, n // 2]
     assert animation.GetAttribute("odori:warp").GetTimeSamples() == [0, n // 2 - 1, n // 2, n - 1]
     assert len(animation.GetAttribute("odori:clipTime").GetTimeSamples()) == n
 

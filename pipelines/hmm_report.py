@@ -1,0 +1,70 @@
+"""What a person is told of a dance by the model of the dancer: what it was learned from, and what the music adds."""
+
+from typing import Any
+
+from assets import hmm_tables
+from pipelines.lake import Lake
+
+_NOBODY = (
+    "no clip was danced to a song of this studio: motions follow each other as in the clips, drawn anew for every "
+    "seed, and the music gives no more than its beats; name the song in clips.csv (performed_to), or give both files "
+    "one name"
+)
+_FEW = "the performances are too short to tell whether their music matters: nothing could be held out; add longer ones"
+
+
+def model_facts(lake: Lake) -> dict[str, Any]:
+    """Gather facts of the model: performances, what the music adds, and sentences a user should read."""
+    n_performances = lake.table("performance").num_rows
+    found = hmm_tables.to_evidence(lake.table("music_evidence"))
+    states = lake.table("basic_motion").num_rows
+    if not n_performances:
+        notes = [_NOBODY]
+    elif not found.n_motions.any():
+        notes = [_FEW]
+    elif not found.music_adds:
+        notes = [
+            f"the music of the {n_performances} performances tells nothing of their motions that the motion before "
+            f"does not (gain {found.gain:.3f}, p {found.p:.3f}): the dance follows the dancer, not the drums"
+        ]
+    else:
+        notes = []
+    return {
+        "performances": n_performances,
+        "basic_motions": states,
+        "music_adds": found.music_adds,
+        "music_gain_nats": found.gain,
+        "music_p_probability": found.p,
+        "notes": notes,
+    }
+
+
+def dance_notes(report: dict[str, Any]) -> list[str]:
+    """Say why a dance is not as wanted, where that is known: its tempo is none the dancer moved at, or it is short."""
+    wanted, notes = report["wanted"], []
+    if _failed(wanted, "warp_easy_ratio"):
+        notes.append(
+            "motions as long as the song's beats ask for are few: they are danced beyond 0.90 to 1.10 of their pace; "
+            "add clips danced near its tempo, or set beats.octave in its brief"
+        )
+    if _failed(wanted, "beat_p_probability"):
+        notes.append("too short, or moving too evenly, for its beats to be told from chance by an independent eye")
+    if _failed(wanted, "seam_jerk_ratio") and wanted["seam_jerk_ratio"]["value"] <= 1.5:
+        notes.append(
+            "seams are within 1.5 of the clips' own jerk, but poses there are so alike that a plain cut is as smooth: "
+            "blends have nothing to better"
+        )
+    return notes
+
+
+def _failed(wanted: dict[str, Any], name: str) -> bool:
+    return name in wanted and wanted[name]["is_passed"] is False
+
+
+def report_lines(facts: dict[str, Any]) -> list[str]:
+    """Tell a person what the model was learned from, and what to know of it."""
+    lines = [f"  {facts['basic_motions']} basic motions, learned from {facts['performances']} performances"]
+    if facts["music_adds"]:
+        gain, p = facts["music_gain_nats"], facts["music_p_probability"]
+        lines.append(f"  the music tells the motion: {gain:+.2f} a motion, p {p:.3f}")
+    return lines + [f"  note: {note}" for note in facts["notes"]]
