@@ -113,14 +113,35 @@ def from_music_segment(song_id: str, segments: Segments) -> pa.Table:
 
 
 def strength_between(feature: pa.Table, grid_s: Float) -> Float:
-    """Mean intensity of the music between beats, (K,) of (K + 1,) seconds; zeros where the song has none."""
+    """Average the intensity of the music between beats.
+
+    Parameters
+    ----------
+    feature : rows of ``music_feature`` of one song
+    grid_s : (K + 1,) float, seconds
+
+    Returns
+    -------
+    (K,) float64; zeros where the song has none
+    """
     total = np.append(0.0, np.cumsum(to_numbers(feature["intensity"]).astype(np.float64)))
     edge = np.clip(np.searchsorted(to_numbers(feature["time_s"]), grid_s), 0, len(total) - 1)
     return np.asarray((total[edge[1:]] - total[edge[:-1]]) / np.maximum(np.diff(edge), 1), np.float64)
 
 
 def from_music_repeat(song_id: str, repeats: Sequence[Repeat], grid_s: Float) -> pa.Table:
-    """Pack the repeats of a song, in seconds of the grid of beats they were found on, (K + 1,)."""
+    """Pack the repeats of a song.
+
+    Parameters
+    ----------
+    song_id : str
+    repeats : in order
+    grid_s : (K + 1,) float, seconds, the beats they were found on
+
+    Returns
+    -------
+    Rows of ``music_repeat``
+    """
     return from_rows(
         MUSIC_REPEAT,
         [
@@ -138,7 +159,17 @@ def from_music_repeat(song_id: str, repeats: Sequence[Repeat], grid_s: Float) ->
 
 
 def to_music_repeat(rows: pa.Table, grid_s: Float) -> list[Repeat]:
-    """Unpack the repeats of a song onto its grid of beats; those whose beats have gone are left out."""
+    """Unpack the repeats of a song onto its beats.
+
+    Parameters
+    ----------
+    rows : of ``music_repeat`` of one song
+    grid_s : (K + 1,) float, seconds
+
+    Returns
+    -------
+    list of Repeat, without those whose beats have gone
+    """
     found = []
     for row in rows.to_pylist():
         first, last, source = (

@@ -36,7 +36,6 @@ PLACES = {
     "motion_feature": (3, 2.6),
     "music_feature": (2, 4.6),
     "music_segment": (2, 5.7),
-    "music_repeat": (2, 3.6),
     "motion_encoder": (4, -0.4),
     "motion_embedding": (5, -0.4),
     "motion_index": (6, -0.9),

@@ -1,12 +1,14 @@
 """Features, segments and matches come back as they were packed."""
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from assets import matching_tables as mt
 from kernels.matching.score import Match
 from kernels.motion.features import MotionFeatures
 from kernels.music.features import MusicFeatures
+from kernels.music.repeats import Repeat
 from kernels.music.segments import Segments
 from schemas.matching import MATCH
 from schemas.motion import MOTION_FEATURE
@@ -65,3 +67,20 @@ def test_nothing_is_packed_as_no_rows():
     assert mt.from_matches("waltz", [], []).num_rows == 0
     assert mt.to_matches(MATCH.empty(), 0) == []
     assert mt.to_rhythms(MOTION_FEATURE.empty()) == {}
+
+
+def test_repeats_come_back_onto_their_beats():
+    grid_s = 0.3 + 0.5 * np.arange(60)
+    found = [Repeat(30, 48, 4, 0.8), Repeat(50, 59, 10, 0.7)]
+    rows = mt.from_music_repeat("song", found, grid_s)
+    back = mt.to_music_repeat(rows, grid_s)
+    assert [(r.first, r.last, r.source) for r in back] == [(30, 48, 4), (50, 59, 10)]
+    assert [r.first for r in mt.to_music_repeat(rows, grid_s[:10])] == []
+    assert mt.to_music_repeat(mt.from_music_repeat("song", [], grid_s), grid_s) == []
+
+
+def test_strength_is_averaged_between_beats():
+    time_s = np.arange(480) / 120
+    rows = pa.table({"time_s": time_s, "intensity": np.repeat([1.0, 3.0, 2.0, 5.0], 120).astype(np.float32)})
+    np.testing.assert_allclose(mt.strength_between(rows, np.array([0.0, 1.0, 2.0, 4.0])), [1, 3, 3.5])
+    np.testing.assert_array_equal(mt.strength_between(rows.slice(0, 0), np.arange(4.0)), 0)
