@@ -250,6 +250,8 @@ def bring_up_to_date(
             return report
         for batch in batches:
             tried.add(batch)
+            if given_up & {(asset, key) for asset in batch.assets for key in batch.keys}:
+                continue  # what it would be made from failed a moment ago
             report.ran.append(batch)
             failed = execute(batch, definitions, instance)
             if failed and len(batch.keys) > 1:  # one partition's trouble must not stop its neighbours: one by one
