@@ -42,6 +42,11 @@ class Batch:
         """Split into batches of one partition each."""
         return [Batch(self.job, self.assets, (key,)) for key in self.keys]
 
+    def without(self, given_up: Collection[tuple[str, str]]) -> list["Batch"]:
+        """Leave out the partitions of which something was given up: itself whole, or one by one what is left."""
+        left = [b for b in self.singles() if not any((asset, b.keys[0]) in given_up for asset in b.assets)]
+        return [self] if len(left) == len(self.keys) else left
+
     def tags(self) -> dict[str, str]:
         """Tags that tell Dagster which partitions: one, or a range run as one."""
         if len(self.keys) < 2:
@@ -248,21 +253,21 @@ def bring_up_to_date(
         batches = plan(state, instance, groups=groups, keys=keys, assets=assets, tried=tried, given_up=given_up)
         if not batches:
             return report
-        for batch in batches:
-            tried.add(batch)
-            if given_up & {(asset, key) for asset in batch.assets for key in batch.keys}:
-                continue  # what it would be made from failed a moment ago
-            report.ran.append(batch)
-            failed = execute(batch, definitions, instance)
-            if failed and len(batch.keys) > 1:  # one partition's trouble must not stop its neighbours: one by one
-                for single in batch.singles():
-                    tried.add(single)
-                    failed = execute(single, definitions, instance)
+        for planned in batches:
+            tried.add(planned)
+            for batch in planned.without(given_up):  # what it would be made from may have failed a moment ago
+                tried.add(batch)
+                report.ran.append(batch)
+                failed = execute(batch, definitions, instance)
+                if failed and len(batch.keys) > 1:  # one partition's trouble must not stop its neighbours: one by one
+                    for single in batch.singles():
+                        tried.add(single)
+                        failed = execute(single, definitions, instance)
+                        report.troubles += failed
+                        given_up |= unmade(single, state) if failed else set()
+                else:
                     report.troubles += failed
-                    given_up |= unmade(single, state) if failed else set()
-            else:
-                report.troubles += failed
-                given_up |= unmade(batch, state) if failed else set()
+                    given_up |= unmade(batch, state) if failed else set()
         state.forget()
         # What was made and is not fresh was edited meanwhile: the next build takes it up, this one goes on.
         given_up |= {(a, k) for b in batches for a in b.assets for k in b.keys if state.state(a, k).state == "stale"}

@@ -59,6 +59,8 @@ def test_session_shows_every_clip_refused_ones_with_their_reason():
         "frame_count": 100,
         "duration_s": 8.0,
         "joint_count": 22,
+        "is_labelled": False,
+        "performed_offset_s": 0.0,
         "metres_per_unit": 1.0,
         "reason": None,
     }
