@@ -185,7 +185,8 @@ def dance(
             made.append(dancing.facts_of(studio, song.key, way))
     if out is not None and made:
         dancing.copy_out(made[0], out)
-    troubles += [f"failed: {f}" for f in report.failed]  # also where the dance could do without what failed
+    told = tuple(f"[{song}{end}" for song in refused for end in "|]")  # a refused song's dance failed, of course
+    troubles += [f"failed: {f}" for f in report.failed if not f.startswith(told)]
     troubles = list(dict.fromkeys(troubles))
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
     facts = dancing.dances_facts(made, troubles, len(keys))
