@@ -14,8 +14,10 @@ import pytest
 
 from assets.formats import usd_check, usd_package, usd_read
 from assets.tables import to_array
-from pipelines import commands
+from pipelines import commands, dancing
+from pipelines.collection import ASSETS
 from pipelines.files import StudioError
+from pipelines.freshness import ON_DEMAND, nodes
 from pipelines.resources import NoProgress
 from schemas.catalog import TABLES
 
@@ -73,8 +75,10 @@ def test_whole_song_is_danced_and_every_frame_accounted_for(built):
     assert set(line["clip_id"].to_pylist()) <= {s["clip_id"] for s in steps}
 
 
-def test_every_declared_table_is_stored(matched):
-    assert {p.name for p in (matched / "lake").iterdir() if p.is_dir()} - {"request"} == set(TABLES)
+def test_every_table_is_stored_but_those_of_what_nobody_asked_for(matched):
+    unused = {n.name for n in nodes(ASSETS).values() if n.group in ON_DEMAND or n.only_for == "hmm"}
+    assert {"motion_index", "basic_motion"} <= unused
+    assert {p.name for p in (matched / "lake").iterdir() if p.is_dir()} - {"request"} == set(TABLES) - unused
 
 
 def test_dancing_again_changes_no_byte(studio):
@@ -119,7 +123,7 @@ def test_copies_share_a_folder_and_leave_what_is_the_users(studio, tmp_path):
 @pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning", "error::ResourceWarning")
 def test_a_copy_leaves_no_file_open(studio, tmp_path):
     for name in ("a.usdz", "b.usdc"):
-        commands._copy(
+        dancing.copy_out(
             {"usdz": studio / "dances/beat/graph.usdz", "stage": studio / "dances/beat/graph.usdc"}, tmp_path / name
         )
     gc.collect()
@@ -173,7 +177,7 @@ def test_usage_errors_end_with_two(wrong):
 def test_wrong_method_and_wrong_suffix(built):
     done = odori("dance", "beat", "--method", "ballet", "--studio", built)
     assert done.returncode == 2
-    assert "want one of graph, matching, got 'ballet'" in done.stderr
+    assert "want one of graph, matching, hmm, got 'ballet'" in done.stderr
     done = odori("dance", "beat", "--out", "x.fbx", "--studio", built)
     assert done.returncode == 2
     assert ".usdz or .usdc" in done.stderr
