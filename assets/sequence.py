@@ -19,6 +19,7 @@ from kernels.matching.score import SCALE_DENOMINATOR, ratios, similarity
 from kernels.motion.features import FEATURE_RATE_HZ, at_feature_rate, link_directions, link_weights
 from kernels.motion.velocity import usable_frames
 from kernels.music.segments import Segments
+from kernels.ranks import rank_correlation
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Choreography, Float
 from schemas.settings import MatchPathSettings, Settings
@@ -364,7 +365,7 @@ def _piece(
     cut = np.rint((np.concatenate([[start_s], inside, [end_s]]) - start_s) * FEATURE_RATE_HZ).astype(np.int64)
     agreement = intensity.agreement(
         intensity.bhattacharyya(intensity.histogram(music, edges[0]), intensity.histogram(motion, edges[1])),
-        intensity.rank_correlation(intensity.beat_means(music, cut), intensity.beat_means(motion, cut)),
+        rank_correlation(intensity.beat_means(music, cut), intensity.beat_means(motion, cut)),
     )
     warp = (end_s - start_s) / (clip_end_s - clip_s)
     return Piece(

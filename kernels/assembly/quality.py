@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import spearmanr
 
 from kernels.assembly.blend import Dance
 from kernels.motion.velocity import kinematic_beats, speed_between
+from kernels.ranks import rank_correlation
 from kernels.types import Choreography, Float
 
 
@@ -167,9 +167,7 @@ def intensity_measures(dance: Dance, music: Float, grid_s: Float) -> list[Measur
     found = 0.0
     if inside.sum() > 2:
         moved = speed_between(dance.position_xyz_m, dance.frame_rate_hz, time_s=np.maximum(grid_s, 0.0))[:-1][inside]
-        heard = music[inside]
-        if np.ptp(moved) > 0 and np.ptp(heard) > 0:
-            found = float(spearmanr(moved, heard).statistic)
+        found = rank_correlation(moved, music[inside])
     return [Measure("intensity_rank_correlation_ratio", found)]
 
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from kernels import rotation
 from kernels.calibration.faults import check_recording
@@ -123,10 +123,10 @@ def low_pass(series: Float, frame_rate_hz: float, *, cutoff_hz: float = CUTOFF_H
     """
     if cutoff_hz > 0.4 * frame_rate_hz or len(series) < 16:
         return np.array(series, np.float64), 1.0
-    sections = signal.butter(2, cutoff_hz, fs=frame_rate_hz, output="sos")
-    _, response = signal.sosfreqz(sections, worN=4096)
+    sections = scipy.signal.butter(2, cutoff_hz, fs=frame_rate_hz, output="sos")
+    _, response = scipy.signal.sosfreqz(sections, worN=4096)
     flat = np.ascontiguousarray(np.moveaxis(series, 0, -1), np.float64)
-    filtered = signal.sosfiltfilt(sections, flat, axis=-1)
+    filtered = scipy.signal.sosfiltfilt(sections, flat, axis=-1)
     return np.ascontiguousarray(np.moveaxis(filtered, -1, 0)), float(np.mean(np.abs(response) ** 4))
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 
+from kernels.ranks import mean_ranks
 from kernels.types import Float, Int, MotionGraph
 
 
@@ -196,7 +196,7 @@ def intensity_price(music: Float, graph: MotionGraph, *, weight: float) -> Float
     """
     if graph.speed is None or not len(music) or not len(graph.speed):
         return np.zeros((len(music), len(graph.clip_index)))
-    ranks = [(rankdata(values) - 0.5) / len(values) for values in (music, graph.speed)]
+    ranks = [(mean_ranks(values) - 0.5) / len(values) for values in (music, graph.speed)]
     return np.asarray(weight * np.subtract.outer(*ranks) ** 2, np.float64)
 
 

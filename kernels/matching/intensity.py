@@ -89,36 +89,13 @@ def beat_means(values: Float, edge: Int) -> Float:
     return np.asarray((total[end] - total[start]) / (end - start), np.float64)
 
 
-def rank_correlation(x: Float, y: Float) -> float:
-    """Spearman's rank correlation, ties given their mean rank.
-
-    Parameters
-    ----------
-    x, y : (n,) float
-
-    Returns
-    -------
-    float, -1 to 1; 0 where n < 3 or either is constant
-    """
-    if len(x) < 3:
-        return 0.0
-    a, b = _centred_ranks(x), _centred_ranks(y)
-    size = float(np.sqrt((a @ a) * (b @ b)))
-    return float(np.clip(a @ b / size, -1.0, 1.0)) if size > 1e-12 else 0.0
-
-
-def _centred_ranks(x: Float) -> Float:
-    """Ranks less their mean, ties given their mean rank: half of how many are below less how many are above."""
-    return np.asarray((np.sign(x[:, None] - x[None]).sum(axis=1)) / 2, np.float64)
-
-
 def agreement(coefficient: float, correlation: float) -> float:
     """Agreement of intensity, 0 to 1: the mean of the Bhattacharyya coefficient and (1 + rank correlation) / 2.
 
     Parameters
     ----------
     coefficient : float, 0 to 1, of :func:`bhattacharyya`
-    correlation : float, -1 to 1, of :func:`rank_correlation`
+    correlation : float, -1 to 1, of :func:`kernels.ranks.rank_correlation`
 
     Returns
     -------

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kernels.matching.intensity import agreement, beat_means, bhattacharyya, histogram, quantile_edges, rank_correlation
+from kernels.matching.intensity import agreement, beat_means, bhattacharyya, histogram, quantile_edges
+from kernels.ranks import rank_correlation
 
 
 def test_equal_histograms_agree_and_disjoint_do_not():
