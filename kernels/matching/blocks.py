@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from kernels.matching.score import SCALE_DENOMINATOR
 
 GROUP = 8  # starts bounded together
-FINEST = 5  # the smallest block whose row is summed from frames; larger ones are summed from smaller ones
 UNIT = 2.0**-24  # the relative error of one rounded float32 operation
 TABLE_MARGIN = 1 + 116 * UNIT  # more than the error of summing 50 frames in float32: tables are true upper bounds
 _PARENTS = {10: 5, 25: 5, 50: 25}

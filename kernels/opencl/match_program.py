@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from importlib import resources
 from typing import Any
 
@@ -127,8 +126,16 @@ class Program:
         if key not in self._built:
             folder = resources.files("kernels.opencl")
             source = "\n".join(folder.joinpath(file).read_text(encoding="utf-8") for file in files)
-            options = ["-cl-mad-enable", "-D", f"LANES={lanes}", "-D", f"WIDTH={self.together}", "-D", f"RUN={RUN}"]
-            with warnings.catch_warnings():  # some compilers talk of vector widths while all is well
-                warnings.simplefilter("ignore", cl.CompilerWarning)
-                self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[2] else []))
+            # -w: a compiler talks of how vectors are passed between functions that are all inlined.
+            options = [
+                "-w",
+                "-cl-mad-enable",
+                "-D",
+                f"LANES={lanes}",
+                "-D",
+                f"WIDTH={self.together}",
+                "-D",
+                f"RUN={RUN}",
+            ]
+            self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[2] else []))
         return self._built[key]

@@ -25,7 +25,6 @@ _LEAST_HIP_M = 0.02
 
 N_CHANNELS = 6 * _N + 8
 """Values a frame of :func:`channels`: joints, their velocities, and what the root does."""
-POSITION = slice(0, 3 * _N)
 VELOCITY = slice(3 * _N, 6 * _N)
 TRAVEL = slice(6 * _N, N_CHANNELS)
 # Divisors that bring channels of unlike units to about one: a third of a metre, a metre a second, a radian a second.

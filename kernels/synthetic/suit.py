@@ -62,7 +62,6 @@ _RANGE_DEG: dict[str, tuple[float, float, float]] = {
     "foot": (6.5, 15, 6),
 }
 _WOBBLE: dict[str, float] = {"thigh": 1.5, "upper_arm": 1.2, "head": 0.2}
-_HINGES = {"elbow": ("l_forearm", "r_forearm"), "knee": ("l_shank", "r_shank")}
 
 
 @dataclass(frozen=True, eq=False)
