@@ -35,7 +35,17 @@ class DeviceInfo:
 
 
 def full_name(device: cl.Device) -> str:
-    """Name a device with its platform and driver, as metadata and reports have it."""
+    """Name a device with its platform and driver, as metadata and reports have it.
+
+    Parameters
+    ----------
+    device : pyopencl.Device
+
+    Returns
+    -------
+    str
+        ``device (platform driver)``, of which the driver's version is part: results may differ in their last bits.
+    """
     return f"{device.name.strip()} ({device.platform.name.strip()} {device.driver_version.strip()})"
 
 

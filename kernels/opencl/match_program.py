@@ -87,12 +87,27 @@ class Program:
         cl.enqueue_nd_range_kernel(self.queue, kernel, whole, group)
 
     def buffer(self, content: NDArray[np.generic]) -> cl.Buffer:
-        """Copy an array to the device; one unused number where it is empty, for a buffer may not be."""
+        """Copy an array to the device; one unused number where it is empty, for a buffer may not be.
+
+        Parameters
+        ----------
+        content : array of any shape and number type
+            As many bytes as the kernel expects: nothing is converted.
+
+        Raises
+        ------
+        cl.MemoryError
+            If the device has not the memory.
+        """
         array = np.ascontiguousarray(content) if content.size else np.zeros(1, content.dtype)
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
 
     def room(self, n_bytes: int) -> cl.Buffer:
         """Make an unset buffer of at least 16 bytes.
+
+        Parameters
+        ----------
+        n_bytes : int, >= 0
 
         Raises
         ------
@@ -108,14 +123,32 @@ class Program:
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size=max(n_bytes, 16))
 
     def read(self, buffer: cl.Buffer, shape: tuple[int, ...], dtype: type[Any]) -> NDArray[Any]:
-        """Wait for the queue and copy the front of a buffer to the host."""
+        """Wait for the queue and copy the front of a buffer to the host.
+
+        Parameters
+        ----------
+        buffer : cl.Buffer of at least the bytes asked for
+        shape, dtype : of what is read
+
+        Returns
+        -------
+        array of that shape and type
+            Nothing is waited for where it has no elements.
+        """
         out = np.zeros(shape, dtype)
         if out.size:
             cl.enqueue_copy(self.queue, out, buffer)
         return out
 
     def write(self, buffer: cl.Buffer, content: NDArray[np.generic], *, offset_bytes: int = 0) -> None:
-        """Copy an array into a buffer."""
+        """Copy an array into a buffer.
+
+        Parameters
+        ----------
+        buffer : cl.Buffer
+        content : array of any shape and number type
+        offset_bytes : int, >= 0, where in the buffer it begins; it must end inside
+        """
         cl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(content), dst_offset=offset_bytes)
 
     def _program(self, name: str, is_safe: bool) -> cl.Program:
