@@ -129,8 +129,8 @@ UNDOCUMENTED = {
         "kernels/synthetic": "performance",
         "schemas": "pins",
         "assets/formats": "usd_character",
-        "assets": "characters dance declare direction graph_memory graph_path hearing hmm_path hmm_plots hmm_tables "
-        "motion motions music partitions proposals search_plots search_tables stage tables",
+        "assets": "characters dance direction graph_memory graph_path hmm_path hmm_plots hmm_tables proposals "
+        "search_plots search_tables stage tables",
         "pipelines": "build calibrate cli collection commands dancing files freshness hmm_report io_managers jobs lake "
         "progress resources schedules sensors status web why",
     }.items()

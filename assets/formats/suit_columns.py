@@ -18,7 +18,7 @@ import pyarrow.compute as pc
 import pyarrow.csv as pc_csv
 import pyarrow.parquet as pq
 
-from assets.formats.errors import FormatError
+from assets.formats.errors import FormatError, check_size
 from kernels.types import Float
 
 MAX_BYTES = 1 << 30
@@ -224,14 +224,7 @@ def read(path: Path | str, *, max_bytes: int = MAX_BYTES) -> Columns:
         If it cannot be opened.
     """
     path = Path(path)
-    size = path.stat().st_size
-    if size > max_bytes:
-        raise FormatError(
-            str(path),
-            0,
-            f"want at most {max_bytes / 1e6:.0f} MB, got {size / 1e6:.0f} MB; cut the recording into takes",
-        )
-    if size == 0:
+    if check_size(path, max_bytes=max_bytes) == 0:
         raise FormatError(str(path), 0, "want a recording, got an empty file; export it again")
     with path.open("rb") as file:
         start = file.read(4)
