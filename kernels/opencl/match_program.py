@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.opencl.device import full_name
+from kernels.opencl.device import build, full_name, only_device
 
 RUN = 4  # pairs of one clip that one work-item refines together, depth first
 _LARGE_BYTES = 2**22
@@ -39,10 +38,8 @@ class Program:
     """
 
     def __init__(self, context: cl.Context, *, lanes: int | None = None, together: int | None = None) -> None:
-        if len(context.devices) != 1:
-            raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
         self.context = context
-        self.device = context.devices[0]
+        self.device = only_device(context)
         self.is_cpu = bool(self.device.type & cl.device_type.CPU)
         most = max(2 * self.device.preferred_vector_width_float, 4)
         self.lanes = lanes or max(width for width in (4, 8, 16) if width <= most)
@@ -157,18 +154,7 @@ class Program:
         lanes = max(self.lanes // 2, 4) if name == "bound_together" else self.lanes
         key = (files[0], lanes, is_safe and files is _SEARCH)
         if key not in self._built:
-            folder = resources.files("kernels.opencl")
-            source = "\n".join(folder.joinpath(file).read_text(encoding="utf-8") for file in files)
+            defined = {"LANES": lanes, "WIDTH": self.together, "RUN": RUN} | ({"SAFE": 1} if key[2] else {})
             # -w: a compiler talks of how vectors are passed between functions that are all inlined.
-            options = [
-                "-w",
-                "-cl-mad-enable",
-                "-D",
-                f"LANES={lanes}",
-                "-D",
-                f"WIDTH={self.together}",
-                "-D",
-                f"RUN={RUN}",
-            ]
-            self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[2] else []))
+            self._built[key] = build(self.context, files, defined, flags=["-w", "-cl-mad-enable"])
         return self._built[key]
