@@ -200,6 +200,7 @@ def find_dance(studio: StudioFolder, text: str, preferred: str) -> str:
 
     Parameters
     ----------
+    studio : StudioFolder
     text : key of a ``song``, or ``song|method``
     preferred : method to take where a song is danced by several
 

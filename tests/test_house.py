@@ -160,3 +160,36 @@ def test_public_functions_tell_their_arguments_and_errors(path):
         if any(isinstance(n, ast.Raise) for n in ast.walk(node)) and "Raises\n---" not in text:
             missing.append(f"{node.name}: Raises")
     assert missing == []
+
+
+def _documented(text):
+    """Names in the Parameters section of a docstring."""
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=\n\n[A-Z][A-Za-z ]+\n-{3,}|\Z)", text, re.DOTALL | re.MULTILINE)
+    lines = section[1].splitlines() if section else []
+    return {name.strip(" *") for line in lines if line[:1].strip() for name in line.split(" : ")[0].split(",")}
+
+
+def _arguments(node):
+    """Names of what a function, a record or a class takes."""
+    if isinstance(node, ast.ClassDef):
+        made = [n for n in node.body if isinstance(n, ast.FunctionDef) and n.name == "__init__"]
+        if not made:
+            return {n.target.id for n in node.body if isinstance(n, ast.AnnAssign)}
+        node = made[0]
+    extra = [a for a in (node.args.vararg, node.args.kwarg) if a]
+    named = {a.arg for a in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, *extra)}
+    return named - {"self", "cls"}
+
+
+@pytest.mark.parametrize("path", sorted(DOCUMENTED), ids=lambda p: str(p.relative_to(REPOSITORY)))
+def test_documented_parameters_are_those_there_are(path):
+    body = ast.parse(path.read_text()).body
+    body += [n for c in body if isinstance(c, ast.ClassDef) for n in c.body]
+    wrong = {
+        node.name: sorted(_documented(text) ^ _arguments(node))
+        for node in body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and _documented(text := ast.get_docstring(node) or "")
+        and _documented(text) != _arguments(node)
+    }
+    assert wrong == {}

@@ -187,6 +187,7 @@ def bumps(n_frames: int, at: Float, height: Float, *, width_s: float, rate_hz: f
     height : (B,) float, >= 0
     width_s : float, seconds, >= 0
         Standard deviation; 0 draws one frame a moment (raw impulses).
+    rate_hz : float, > 0, frames a second
 
     Returns
     -------

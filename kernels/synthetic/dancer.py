@@ -24,10 +24,22 @@ _X, _Y, _Z = np.eye(3)
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """What a move asks of the body over F frames; angles in radians, places in metres.
+    """What a move asks of the body over F frames; (2, …) are left and right.
 
-    ``foot`` is (2, F, 3), left and right: where the ankles shall be. ``raised`` and ``swing`` are (2, F): arms from
-    hanging (0) to level (pi/2) at the side, and forwards from the shoulder. ``elbow`` is (2, F).
+    Parameters
+    ----------
+    hips_xyz_m : (F, 3) float, metres, world
+    heading : (F,) float, radians
+        Where the body faces, from +Z towards +X.
+    hip_turn, chest_turn : (F,) float, radians
+        How far hips and chest are turned from there, about the vertical.
+    lean : (F,) float, radians, forwards
+    foot_xyz_m : (2, F, 3) float, metres, world
+        Where the ankles shall be.
+    foot_heading : (2, F) float, radians
+    raised, swing : (2, F) float, radians
+        Arms from hanging (0) to level (pi/2) at the side, and forwards from the shoulder.
+    elbow : (2, F) float, radians, 0 stretched
     """
 
     hips_xyz_m: Float
