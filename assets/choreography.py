@@ -21,7 +21,7 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 @table_asset(
     CHOREOGRAPHY,
     group="dance",
-    code_version="4",
+    code_version="5",
     settings="path match_path hmm_path choreography_model dance.blend_s",
     sources="request",
     partitions=DANCE,

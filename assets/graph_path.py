@@ -154,7 +154,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
     steps, kept = chosen_steps(path, graph, song.grid_s, known.clip_ids, song.duration_s, settings.dance)
     spans = zip(path.beat_index.tolist(), path.beat_span.tolist(), path.source_node.tolist(), strict=True)
     intensity = np.array([strength[k : k + d, u].sum() for k, d, u in spans])
-    columns = ("transition", "warp", "stride", "beat", "repetition", "diversity")
+    columns = ("transition", "stay", "warp", "stride", "beat", "repetition", "diversity")
     every = {name: getattr(path, f"{name}_cost") for name in columns}
     every |= {"intensity": intensity, "wish": np.maximum(path.wish_cost - intensity, 0.0)}
     return Danced(
@@ -270,6 +270,8 @@ def path_costs(settings: PathSettings) -> PathCosts:
         warp=usual.warp * settings.warp_weight,
         usage=usual.usage * settings.repetition_weight,
         seam=settings.seam_cost,
+        stay=settings.stay_cost,
+        stay_beats=settings.stay_beats,
         missed_beat=usual.missed_beat * settings.beat_weight,
         jump_back=usual.jump_back * settings.repetition_weight,
     )

@@ -52,7 +52,8 @@ class Path:
     beat_span, motion_span : (S,) int64, >= 1, music and motion beats it covers
     has_transition : (S,) bool
         Whether it does not start where the step before ended.
-    transition_cost, warp_cost, repetition_cost, stride_cost, beat_cost, diversity_cost, wish_cost : (S,) float64, >= 0
+    transition_cost, stay_cost, warp_cost, repetition_cost, stride_cost, beat_cost, diversity_cost, wish_cost :
+        (S,) float64, >= 0
     warp_ratio : (S,) float64, song time ÷ clip time
     is_outside : (S,) bool, whether the ratio leaves the hard bounds
     """
@@ -64,6 +65,7 @@ class Path:
     motion_span: Int
     has_transition: Mask
     transition_cost: Float
+    stay_cost: Float
     warp_cost: Float
     repetition_cost: Float
     stride_cost: Float
@@ -78,6 +80,7 @@ class Path:
         """Sum of all components over all steps."""
         parts = (
             self.transition_cost,
+            self.stay_cost,
             self.warp_cost,
             self.repetition_cost,
             self.stride_cost,
@@ -136,7 +139,8 @@ def find_path(
 
     Notes
     -----
-    *Program* (:mod:`kernels.graph.program`): exact, all starts at once, K · (N · |steps| + E) operations. It runs from
+    *Program* (:mod:`kernels.graph.program`): exact, all starts at once, K · (M · N · |steps| + E) operations with M beats
+    of a stay that is long enough, K · (M + 1) · N numbers kept. It runs from
     the last beat backwards, so that only nodes from which the last beat can still be reached ever have a cost: this
     loses fewer clips than pruning the graph to its strongly connected part, which forbids one-way streets even where
     the song ends before they do. Ties: no transition before any, then the lower clip and node, then the earlier kind.
@@ -182,8 +186,8 @@ def find_path(
             stretch_price=stretch_price,
             interval_price=interval_price,
         )
-        whole = program.solve(0, n_beats, after={n_beats: np.zeros(n_nodes)})
-        if len(start) and np.isfinite(whole.start[0][start]).any():
+        whole = program.solve(0, n_beats, after={n_beats: program.at_the_end})
+        if len(start) and np.isfinite(whole.begin[start]).any():
             moves = program.decode(whole, first=0, last=n_beats, arrived=None, starts=start)
 
             def total(candidate: list[Move], program: Program = program) -> float:
@@ -268,7 +272,7 @@ def more_than_any(
     largest = float(graph.weight.max(initial=0.0))
     scale = costs.transition_scale or (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
     roughest = float(rough_cost(graph, costs).max(initial=0.0))
-    seam = costs.seam + costs.transition * largest / scale + roughest + costs.jump_back
+    seam = costs.seam + costs.transition * largest / scale + roughest + costs.jump_back + costs.stay
     missed = costs.missed_beat * max(d for _, d in steps)
     most = 1.0 + n_beats * (warp + stride + seam + missed + longest * costs.usage * n_beats * longest)
     if stretch_price is not None and stretch_price.size:
@@ -284,13 +288,15 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     if program is None or not moves:
         none, no = np.zeros(0, np.int64), np.zeros(0, bool)
         zero = np.zeros(0)
-        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, zero, zero, no)
+        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, zero, zero, zero, no)
     span = np.array([d for _, d in program.steps])[kind]
     end = np.array([program.end[k][u] for _, u, k in moves], np.int64)
     seams = np.append(False, source[1:] != end[:-1])
     edge = np.array([program.edge(v, u) for v, u in zip(end[:-1][seams[1:]], source[seams], strict=True)], np.int64)
     transition, repetition = np.zeros(len(moves)), np.zeros(len(moves))
     transition[seams], repetition[seams] = program.seam[edge], program.jump_back[edge]
+    stay, at = np.zeros(len(moves)), beat[seams]
+    stay[np.flatnonzero(seams)[1:]] = program.hurry[np.minimum(np.diff(at), program.long_enough) - 1]
     shown, shown_by = program.stretches(moves)
     np.add.at(repetition, shown_by, usage_cost(shown, program.n_nodes, costs))
     diversity = np.zeros(len(moves))
@@ -305,6 +311,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
         motion_span=np.array([m for m, _ in program.steps])[kind],
         has_transition=seams,
         transition_cost=transition,
+        stay_cost=stay,
         warp_cost=warp_cost(ratio, costs),
         repetition_cost=repetition,
         stride_cost=stride,
