@@ -7,8 +7,8 @@ in memory with the settings of the studio; nothing is written. *Seams* are all s
 from 0.1 s before a blend to 0.1 s after it, over the 99th percentile of the clips danced, at the dance's own pace; the
 same choreography cut without blends stands beside. *Slide* is added to what the clips have themselves, per second of
 contact. *Beats*: songs whose F at 70 ms by an observer that knows nothing of the plan is met by less than one in a
-hundred dances whose beats are shifted at random in blocks of 4 s. *Stays* are the music beats from one seam to the next.
-*Intensity* is the rank correlation of the music's strength and the speed of the joints, beat by beat.
+hundred dances whose beats are shifted at random in blocks of 4 s. *Stays* are the music beats from one seam to the
+next. *Intensity* is the rank correlation of the music's strength and the speed of the joints, beat by beat.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Float
-
 
 _INTENSITY = "intensity_rank_correlation_ratio"
 

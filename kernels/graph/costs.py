@@ -156,10 +156,14 @@ def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:
     -------
     (E,) float64, >= 0; empty without transitions
     """
-    scale = costs.transition_scale
-    if scale is None:
-        scale = float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0
-    return np.asarray(costs.seam + costs.transition * graph.weight / (scale if scale > 0 else 1.0), np.float64)
+    return np.asarray(costs.seam + costs.transition * graph.weight / weight_scale(graph, costs), np.float64)
+
+
+def weight_scale(graph: MotionGraph, costs: PathCosts) -> float:
+    """Weight of a poor seam, > 0: the costs' own, else the 95th percentile of the graph's; 1 without transitions."""
+    if costs.transition_scale is not None:
+        return costs.transition_scale
+    return (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
 
 
 def rough_cost(graph: MotionGraph, costs: PathCosts) -> Float:

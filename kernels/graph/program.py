@@ -6,11 +6,12 @@ K music intervals between the beats g_0 < … < g_K. A *step* (m, d) begins at n
 u's clip and ends on beat k + d. A *stay* lasts from one transition to the next; r counts the music beats since the last
 one, up to M, where a stay is long enough. Two costs to go::
 
-    start[r, k, u]  = min over steps of  cost(k, u, step) + price(u, step) + arrive[min(r + d, M), k + d, u after m beats]
+    start[r, k, u]  = min over steps of  cost(k, u, step) + price(u, step) + arrive[r + d, k + d, u after m beats]
     arrive[r, k, v] = min(start[r, k, v], hurry(r) + min over transitions v → u of  cost(v → u) + start[0, k, u])
 
-The inner minimum does not depend on r, so a beat costs M · N · |steps| + E operations, not M · E. The song's start is no
-transition: a dance begins there with r = M, and nothing is paid for where the song ends.
+with r + d taken as M where it is more. The inner minimum does not depend on r, so a beat costs M · N · |steps| + E
+operations, not M · E. The song's start is no transition: a dance begins there with r = M, and nothing is
+paid for where the song ends.
 
 A cost is finite exactly where the last beat can still be reached: the recursion runs backwards, so it *is* the backward
 reachability, and a decoded path can only use such nodes. No state exists for a step that is outside the bounds, or for
@@ -19,7 +20,7 @@ one that ``admissible`` forbids.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +43,9 @@ Mask = NDArray[np.bool_]
 Move = tuple[int, int, int]
 """One step of a path: music beat, node, index of the kind of step."""
 
+StepPrice = Mapping[tuple[int, int], Float]
+"""By music beat and kind of step, (N,) by the node where the step starts: its price, infinite where it is forbidden."""
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -57,6 +61,17 @@ class Solution:
     begin: Float
     start: Mapping[int, Float]
     arrive: Mapping[int, Float]
+
+
+def step_ends(graph: MotionGraph, steps: Sequence[tuple[int, int]]) -> list[Int]:
+    """Node where each kind of step (m, d) ends by the one where it starts, (N,) each; -1 where its clip is over."""
+    ends = []
+    for motion_beats, _ in steps:
+        end = np.arange(len(graph.clip_index))
+        for _ in range(motion_beats):
+            end = np.where(end >= 0, graph.next_node[end], -1)
+        ends.append(end)
+    return ends
 
 
 class Program:
@@ -79,6 +94,8 @@ class Program:
         Added to every stretch between a node and the next, whenever it is danced.
     interval_price : (K, N) float, >= 0, or None
         Added where music interval k is danced with a step that starts at the node.
+    step_price : StepPrice
+        Added to single steps.
     """
 
     def __init__(
@@ -93,6 +110,7 @@ class Program:
         outside_price: float,
         stretch_price: Float | None = None,
         interval_price: Float | None = None,
+        step_price: StepPrice | None = None,
     ) -> None:
         self.graph, self.beat_s, self.steps, self.costs = graph, beat_s, steps, costs
         self.n_nodes, self.n_beats = len(graph.clip_index), len(beat_s) - 1
@@ -105,14 +123,10 @@ class Program:
         self._leaving, self._first_edge = np.unique(self._source, return_index=True)
         self._edge_of = np.searchsorted(self._source, np.arange(self.n_nodes + 1))
         self.stride = [stride_cost(m, d, costs) for m, d in steps]
-        self.end, self.clip_s = [], []
-        for motion_beats, _ in steps:
-            end = np.arange(self.n_nodes)
-            for _ in range(motion_beats):
-                end = np.where(end >= 0, graph.next_node[end], -1)
-            self.end.append(end)
-            self.clip_s.append(np.where(end >= 0, graph.time_s[end] - graph.time_s, np.inf))
+        self.end = step_ends(graph, steps)
+        self.clip_s = [np.where(end >= 0, graph.time_s[end] - graph.time_s, np.inf) for end in self.end]
         self._interval_price = interval_price
+        self._step_price = {} if step_price is None else step_price
         self.price = np.zeros(self.n_nodes) if stretch_price is None else stretch_price
         self.missed = [beat_cost(graph, end, d, costs) for end, (_, d) in zip(self.end, steps, strict=True)]
         self.hurry = hurry_cost(costs)
@@ -137,17 +151,20 @@ class Program:
             fits &= self._admissible[beat : beat + music_beats, nodes].all(axis=0)
         cost = np.full(ratio.shape, np.inf)
         cost[fits] = warp_cost(ratio[fits], self.costs) + self.stride[kind] + self.missed[kind][nodes][fits]
-        if self._interval_price is not None:
-            cost += self.interval_cost(beat, kind, nodes)
+        if self._interval_price is not None or self._step_price:
+            cost += self.wish_cost(beat, kind, nodes)
         if self._outside_price:
             cost[fits & ~is_within(ratio, self.costs.hard_ratio)] += self._outside_price
         return cost
 
-    def interval_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float:
-        """Price of the music intervals that a kind of step covers, danced from the nodes; zeros where none is set."""
-        if self._interval_price is None:
-            return np.zeros(len(np.arange(self.n_nodes)[nodes]))
-        return np.asarray(self._interval_price[beat : beat + self.steps[kind][1], nodes].sum(axis=0), np.float64)
+    def wish_cost(self, beat: int, kind: int, nodes: Int | slice = slice(None)) -> Float:
+        """Price of a kind of step by what is wished of its music intervals and of itself; zeros where nothing is."""
+        cost = np.zeros(len(np.arange(self.n_nodes)[nodes]))
+        if self._interval_price is not None:
+            cost += self._interval_price[beat : beat + self.steps[kind][1], nodes].sum(axis=0)
+        if (beat, kind) in self._step_price:
+            cost += self._step_price[beat, kind][nodes]
+        return cost
 
     @property
     def at_the_end(self) -> Float:
@@ -243,8 +260,8 @@ class Program:
 
         Parameters
         ----------
-        arrived : node where the step before ended and :meth:`beats_stayed` there, or None at the song's first beat: then
-            one of ``starts`` begins
+        arrived : node where the step before ended and :meth:`beats_stayed` there, or None at the song's first beat:
+            then one of ``starts`` begins
         price : as given to :meth:`solve`
 
         Returns

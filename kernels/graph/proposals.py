@@ -121,7 +121,7 @@ class Proposals:
         return found
 
     def _forward(self, beat: int) -> Float:
-        """Cost so far of being ready to start a step at a beat, (M + 1, N) as the program counts stays; made on demand."""
+        """Cost so far of being ready to start a step at a beat, (M + 1, N) by the beats of stay; made on demand."""
         program = self._program
         most = program.long_enough
         while len(self._ready) <= beat:

@@ -39,7 +39,7 @@ def structure_pins(
     path : Path of the song
     repeats : in order
     reach : Reach of the song
-    kept : the director's own pins; intervals they touch are left to them
+    kept : the director's own pins; where one would have another thing danced than the part it repeats, it is left to it
 
     Returns
     -------
@@ -47,16 +47,15 @@ def structure_pins(
         One pin an interval, and how many repeats they hold: those that can be danced again, one after the other.
     """
     node = node_of_interval(path)
-    directed = np.zeros(len(node), bool)
-    for pin in kept:
-        directed[pin.first : pin.last] = True
     found: list[Pin] = []
     n_held = 0
     for r in repeats:
         pins = []
         for later in range(r.first + FREE_BEATS, min(r.last, len(node)) - FREE_BEATS):
             earlier = r.source + later - r.first
-            if not (directed[later] or directed[earlier]):
+            if all(
+                pin.sources(k)[node[earlier]] for k in (earlier, later) for pin in kept if pin.first <= k < pin.last
+            ):
                 nodes = np.arange(reach.n_nodes) == node[earlier]
                 pins += [Pin("structure", k, k + 1, nodes) for k in (earlier, later)]
         if pins and reach.keeps([*kept, *found, *pins]):
