@@ -143,8 +143,8 @@ def find_path(
     Notes
     -----
     *Program* (:mod:`kernels.graph.program`): exact, all starts at once, K · (M · N · |steps| + E) operations with M
-    beats of a stay that is long enough, K · (M + 1) · N numbers kept. It runs from the last beat backwards, so that only
-    nodes from which the last beat can still be reached ever have a cost: this loses fewer clips than pruning the graph
+    beats of a stay that is long enough, K · (M + 1) · N numbers kept. It runs from the last beat backwards, so that
+    only nodes from which the last beat can still be reached ever have a cost: this loses fewer clips than pruning it
     to its strongly connected part, which forbids one-way streets even where the song ends before they do. Ties: no
     transition before any, then the lower clip and node, then the earlier kind.
 

@@ -5,47 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kernels.graph.costs import PathCosts, hurry_cost, stride_cost, warp_cost
+from kernels.graph.costs import PathCosts, hurry_cost
 from kernels.graph.path import STEPS, InfeasiblePathError, find_path
 from kernels.graph.pins import Pin, admitted
 from kernels.graph.program import Program
 from kernels.graph.proposals import Proposals
-
-
-def every_dance(graph, beat_s, costs, starts, admissible=None, steps=STEPS):
-    """List every dance within the hard bounds: cost, then what ties go by, then its moves."""
-    n = len(beat_s) - 1
-    scale = costs.transition_scale or np.percentile(graph.weight, 95)
-    jumps = {}
-    for s, t, w in zip(graph.source.tolist(), graph.target.tolist(), graph.weight.tolist(), strict=True):
-        back_s = graph.time_s[s] - graph.time_s[t]
-        goes_back = graph.clip_index[s] == graph.clip_index[t] and 0 <= back_s <= costs.jump_back_window_s
-        jumps.setdefault(s, []).append((t, costs.seam + costs.transition * w / scale + costs.jump_back * goes_back))
-    found = []
-
-    def dance(beat, ready, moves, cost, order):
-        if beat == n:
-            found.append((cost, order, moves))
-            return
-        for is_jump, node, price, stayed in ready:
-            for kind, (m, d) in enumerate(steps):
-                end = node
-                for _ in range(m):
-                    end = int(graph.next_node[end]) if end >= 0 else -1
-                if end < 0 or beat + d > n:
-                    continue
-                if admissible is not None and not admissible[beat : beat + d, node].all():
-                    continue
-                ratio = (beat_s[beat + d] - beat_s[beat]) / (graph.time_s[end] - graph.time_s[node])
-                if not costs.hard_ratio[0] - 1e-9 <= ratio <= costs.hard_ratio[1] + 1e-9:
-                    continue
-                step = float(warp_cost(ratio, costs)) + stride_cost(m, d, costs)
-                left = max(costs.stay_beats - stayed - d, 0) / costs.stay_beats * costs.stay
-                on = [(0, end, 0.0, stayed + d), *((1, t, c + left, 0) for t, c in jumps.get(end, []))]
-                dance(beat + d, on, [*moves, (beat, node, kind)], cost + price + step, [*order, is_jump, node, kind])
-
-    dance(0, [(0, int(node), 0.0, 10**6) for node in starts], [], 0.0, [])
-    return found
 
 
 def random_case(seed, make_random_graph):
@@ -58,7 +22,7 @@ def random_case(seed, make_random_graph):
 
 
 @pytest.mark.parametrize("seed", range(150))
-def test_agrees_with_all_dances(seed, make_random_graph):
+def test_agrees_with_all_dances(seed, make_random_graph, every_dance):
     graph, beat_s, costs, mask, starts = random_case(seed, make_random_graph)
     every = every_dance(graph, beat_s, costs, starts, mask)
     if not every:
@@ -74,7 +38,7 @@ def test_agrees_with_all_dances(seed, make_random_graph):
     assert path.stay_cost[path.has_transition][:1].sum() == 0
 
 
-def test_the_cases_hold_stays_that_were_cut_short(make_random_graph):
+def test_the_cases_hold_stays_that_were_cut_short(make_random_graph, every_dance):
     """Some of the best dances above pay for a short stay, and some would be others without the price."""
     paid = changed = 0
     for seed in range(150):
@@ -92,7 +56,7 @@ def test_the_cases_hold_stays_that_were_cut_short(make_random_graph):
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_ties_go_by_one_rule(seed, make_graph):
+def test_ties_go_by_one_rule(seed, make_graph, every_dance):
     """Costs in halves and quarters, added without rounding: of equal dances the one that the rule names."""
     rng = np.random.default_rng(seed)
     beats = [0.5 * np.arange(rng.integers(3, 6)) for _ in range(4)]
@@ -113,7 +77,7 @@ def test_ties_go_by_one_rule(seed, make_graph):
 
 
 @pytest.mark.parametrize("seed", range(60))
-def test_a_proposal_costs_what_its_pin_costs(seed, make_random_graph):
+def test_a_proposal_costs_what_its_pin_costs(seed, make_random_graph, every_dance):
     graph, beat_s, costs, mask, starts = random_case(seed, make_random_graph)
     n, n_nodes = mask.shape
     program = Program(
