@@ -1,11 +1,11 @@
-"""Feet of real dances, left alone and locked, at several frame rates: what moves through seams, what knees and seams pay.
+"""Feet of real dances, free and locked, at several frame rates: what moves through seams, what knees and seams pay.
 
     python benchmarks/feet.py [--studio DIR] [--songs N] [--rates HZ ...] [--json]
 
-The studio is built already (``odori build``), or is made of the real test data. *Slip*: how far each ankle and each toe
-joint that is planted in the clips from one end of a blend to the other moves over it, in centimetres. *Slide*: of planted
-feet anywhere, over what the clips have themselves. *Jerk*: peaks at seams over the 99th percentile of the clips danced.
-*Knees*: how abruptly they turn at one frame in a thousand, over the same of the clips; median and worst of songs.
+The studio is built already (``odori build``), or is made of the real test data. *Slip*: how far each ankle and each
+toes joint that is planted in the clips from one end of a blend to the other moves over it, in centimetres. *Slide*: of
+planted feet anywhere, over what the clips have themselves. *Jerk*: peaks at seams over the 99th percentile of the clips
+danced. *Knees*: how abruptly they turn at one frame in a thousand, over the same of the clips; median, worst of songs.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def row(name: str, rate_hz: float, judged: list[Figures]) -> dict[str, float | s
 
 def table(rows: list[dict[str, float | str]]) -> str:
     """Write the rows as Markdown."""
-    head = "| feet | frames a second | slip, cm: median | p95 | worst | added slide | depth, cm | jerk: median | p95 | worst "
+    head = "| feet | frames/s | slip, cm: median | p95 | worst | added slide | depth, cm | jerk: median | p95 | worst "
     lines = [head + "| knees: median | worst |", "|" + "---|" * 12]
     for r in rows:
         figures = [f"{value:.2f}" for key, value in list(r.items())[3:] if isinstance(value, float)]
