@@ -137,6 +137,7 @@ def lock_feet(dance: Dance, planted: FootContacts, *, give: Give | None = None) 
     root[:, 1] = _height_m(position, foot)
     foot = _within_reach(position, foot - root[:, None] * UP, give.stretch_ratio)
     orientation = grounding.bend_legs(position, orientation, foot, limit_rad=give.leg_limit_rad)
+    orientation = _above_floor(dance.root_xyz_m + root, orientation, give.leg_limit_rad)
     local = rotation.continuous(kinematics.to_local(CANONICAL, orientation))
     place = dance.root_xyz_m + root
     position, _ = kinematics.forward(CANONICAL, place, local)
@@ -196,3 +197,15 @@ def _within_reach(position: Float, foot: Float, stretch_ratio: float) -> Float:
     most = np.maximum(stretch_ratio * (grounding.LEG_M - was), 1e-9)
     allowed = longer * most / np.hypot(longer, most)
     return np.asarray(way * ((now - longer + allowed) / np.maximum(now, 1e-9))[..., None] + hip - ankle, np.float64)
+
+
+def _above_floor(root: Float, orientation: Float, limit_rad: float) -> Float:
+    """Raise feet (F, 22, 4 oriented) out of the floor: fast ones swing through it between two frames of a slow clip."""
+    position = kinematics.hang(CANONICAL, root, orientation)
+    lowest = np.minimum(position[:, grounding.ANKLES, 1], position[:, grounding.TOES, 1])
+    under = np.flatnonzero((lowest < 0).any(axis=1))
+    out = orientation.copy()
+    if len(under):
+        lift = np.maximum(-lowest[under], 0.0)[..., None] * UP
+        out[under] = grounding.bend_legs(position[under], orientation[under], lift, limit_rad=limit_rad)
+    return out

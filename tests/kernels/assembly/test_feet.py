@@ -141,3 +141,15 @@ def test_a_foot_comes_home_when_it_is_lifted():
     away = np.abs(free.position_xyz_m - mixed.position_xyz_m)[:, grounding.ANKLES, 0].max(axis=1)
     assert away[120] > 0.015
     assert away[[0, 179]].max() < 0.4 * away[120]
+
+
+def test_a_foot_that_swings_through_the_floor_is_raised():
+    mixed, planted = held_apart(0.0)
+    sunk = mixed.root_xyz_m.copy()
+    sunk[140:144, 1] -= np.array([0.05, 0.1, 0.1, 0.05])
+    position, _ = kinematics.forward(CANONICAL, sunk, mixed.rotation_wxyz)
+    low = Dance(mixed.frame_rate_hz, sunk, mixed.rotation_wxyz, position, mixed.lineage)
+    held = lock_feet(low, planted).position_xyz_m[:, grounding.TOES, 1]
+    assert position[:, grounding.TOES, 1].min() < -0.03
+    assert held.min() > -1e-6
+    np.testing.assert_allclose(held[:139], position[:139, grounding.TOES, 1], atol=2e-3)
