@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from kernels import rotation
-from kernels.assembly.blend import assemble
 from kernels.assembly.seam_quality import peak_ratios, seam_measures
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Clip
