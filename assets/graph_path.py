@@ -23,7 +23,7 @@ from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreogr
 from kernels.graph.pins import Pin, Reach, admitted, find_conflict
 from kernels.graph.structure import structure_pins
 from kernels.types import BeatGrid, Choreography, Float, Int, MotionGraph
-from schemas.keys import source_clip
+from schemas.keys import seen_label, source_clip
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
 
@@ -98,6 +98,7 @@ def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame
     """
     known = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
     facts = [known[source_clip(clip)] for clip in clip_ids]
+    facts = [row | {"label": seen_label(str(row["label"]), clip)} for row, clip in zip(facts, clip_ids, strict=True)]
     of_node = graph.clip_index
     licence = [str(row["licence"]) for row in facts]
     is_whole = np.array([licences.terms_of(name).no_derivatives for name in licence] or [False])[of_node]
