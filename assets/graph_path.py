@@ -27,7 +27,7 @@ from kernels.graph.program import StepPrice
 from kernels.graph.structure import structure_pins
 from kernels.graph.transitions import THRESHOLD
 from kernels.types import BeatGrid, Choreography, Float, Int, MotionGraph
-from schemas.keys import source_clip
+from schemas.keys import seen_label, source_clip
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
 
@@ -114,6 +114,7 @@ def catalogue(
     """
     known = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
     facts = [known[source_clip(clip)] for clip in clip_ids]
+    facts = [row | {"label": seen_label(str(row["label"]), clip)} for row, clip in zip(facts, clip_ids, strict=True)]
     of_node = graph.clip_index
     licence = [str(row["licence"]) for row in facts]
     is_whole = np.array([licences.terms_of(name).no_derivatives for name in licence] or [False])[of_node]

@@ -53,6 +53,7 @@ def judge(studio: BuiltStudio, danced: Danced, frame_rate_hz: float) -> tuple[di
         *foot_quality.foot_measures(dance, steps, clips),
         *foot_quality.knee_measures(dance, steps, clips),
         *quality.intensity_measures(dance, danced.strength, danced.grid_s),
+        *foot_quality.slip_measures(dance, steps, clips),
     ]
     found = {m.name: m.value for m in measures}
     stays = stays_of(danced)
@@ -96,6 +97,7 @@ def bars(rows: dict[str, dict[str, float]], blended: Float, cut: Float) -> list[
         ("added_slide_ratio", "at most 0.10 of the clips' own", added, added <= 0.10),
         ("penetration_cm", "at most 1", float(of("penetration_cm").max()), bool(of("penetration_cm").max() <= 1)),
         ("knee_pop_ratio", "median of songs, at most 1.2", knees, knees <= 1.2),
+        ("seam_foot_slip_worst_cm", "", float(of("seam_foot_slip_worst_cm").max()), True),
         ("warp_easy_ratio", "at least 0.95", easy, easy >= 0.95),
         ("songs_above_chance_ratio", "at least 0.80", sure, sure >= 0.80),
         ("intensity_rank_correlation_ratio", "median of songs", percentile(of(_INTENSITY), 50), True),

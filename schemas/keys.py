@@ -125,6 +125,26 @@ def source_clip(name: str) -> str:
     return name.removesuffix(_MIRRORED)
 
 
+def seen_label(label: str, name: str) -> str:
+    """Label of what a clip shows by the name it is danced under: mirrored, ``wave-right-hand`` is ``wave-left-hand``.
+
+    Parameters
+    ----------
+    label : of the clip; the words ``left`` and ``right`` change places in a mirror, whatever letters they are in
+    name : key of a clip, or of its mirror image
+    """
+    return _SIDE.sub(lambda word: _as(word[0], _OTHER[word[0].lower()]), label) if is_mirrored(name) else label
+
+
+_OTHER = {"left": "right", "right": "left"}
+_SIDE = re.compile(r"(?<![a-z])(left|right)(?![a-z])", re.IGNORECASE)
+
+
+def _as(word: str, other: str) -> str:
+    """Spell a word with capitals as another has them."""
+    return other.upper() if word.isupper() else other.capitalize() if word[0].isupper() else other
+
+
 def song_key(stem: str) -> str:
     """Key of a song from its file's name without suffix."""
     return slug(stem)
