@@ -167,21 +167,12 @@ def _write_graph(folder: Path, rows: pa.Table, vector: Vectors) -> dict[str, str
     name = f"graph-{hashlib.sha256(keys.tobytes()).hexdigest()[:16]}.usearch"
     with beside.written_beside(folder / name) as partial:
         graph.save(str(partial))
-    recall = measured_recall(StoredIndex(rows, vector, folder, name))
+    recall = _recall(StoredIndex(rows, vector, folder, name))
     return {"approximate": name, "recall": f"{recall:.4f}"}
 
 
-def measured_recall(index: StoredIndex) -> float:
-    """Measure the share of the ten nearest rows that the graph finds, over evenly spread rows as queries.
-
-    Parameters
-    ----------
-    index : StoredIndex of N >= 1 rows with a graph
-
-    Returns
-    -------
-    float, 0 to 1
-    """
+def _recall(index: StoredIndex) -> float:
+    """Measure the share of the ten nearest rows that the graph finds, over evenly spread rows as queries."""
     at = np.unique(np.linspace(0, len(index.vector) - 1, _RECALL_QUERIES).round().astype(int))
     found = total = 0
     for row in at.tolist():
