@@ -43,7 +43,16 @@ class Poses:
     threshold: float = THRESHOLD
 
     def read(self, names: Sequence[str]) -> Iterator[tables.CanonicalClip]:
-        """Read some clips; those with names of mirrored ones, mirrored. Clips there are not are left out."""
+        """Read some clips; those with names of mirrored ones, mirrored. Clips there are not are left out.
+
+        Parameters
+        ----------
+        names : clips, or mirrored ones as :func:`schemas.keys.mirrored` names them
+
+        Yields
+        ------
+        CanonicalClip, in the stored order
+        """
         wanted = {source_clip(name) for name in names}
         for key in self.stored.keys:
             here = wanted & set(self.stored.stamp(key).clips)
@@ -57,6 +66,14 @@ class Poses:
 
     def wanted(self, wish: PinWish) -> BeatFeatures | None:
         """Take the pose of a wish; None where there is no such clip.
+
+        Parameters
+        ----------
+        wish : PinWish that names a pose
+
+        Returns
+        -------
+        BeatFeatures of that one moment, or None
 
         Raises
         ------
@@ -207,7 +224,16 @@ class _Moment:
 
 
 def moment_of(wish: PinWish, song: Song) -> float:
-    """Find the moment of the song in which a pose is to be shown, seconds.
+    """Find the moment of the song in which a pose is to be shown.
+
+    Parameters
+    ----------
+    wish : PinWish that names a pose
+    song : Song
+
+    Returns
+    -------
+    float, seconds of the song, >= 0
 
     Raises
     ------

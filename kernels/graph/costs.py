@@ -160,7 +160,18 @@ def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:
 
 
 def weight_scale(graph: MotionGraph, costs: PathCosts) -> float:
-    """Weight of a poor seam, > 0: the costs' own, else the 95th percentile of the graph's; 1 without transitions."""
+    """Give the weight of a poor seam.
+
+    Parameters
+    ----------
+    graph : MotionGraph
+    costs : PathCosts
+
+    Returns
+    -------
+    float, > 0
+        The costs' own, else the 95th percentile of the graph's; 1 where there are no transitions, or that is 0.
+    """
     if costs.transition_scale is not None:
         return costs.transition_scale
     return (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
