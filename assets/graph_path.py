@@ -34,6 +34,9 @@ from schemas.settings import DanceSettings, PathSettings, Settings
 SOFT_WISH = 1.0
 """Price of a beat that a soft wish would have otherwise: the document's, about that of a seam."""
 
+POSE_WEIGHT = 8.0
+"""Price of a pose as unlike the one that is wished as a poor seam's two: worth several seams to come nearer."""
+
 
 @dataclass(frozen=True)
 class Direction:
@@ -265,7 +268,7 @@ def pins_of(known: Catalogue, song: SongBeats, asked: Direction, costs: PathCost
         if any(wish.pose for wish in asked.wishes):
             if known.poses is None:
                 raise ValueError("poses: want those of the clips where a pin wishes for one, got none")
-            weight = costs.transition / weight_scale(known.graph, costs)
+            weight = POSE_WEIGHT / weight_scale(known.graph, costs)
             posed = to_pose_pins(asked.wishes, song, known.graph, known.clip_ids, known.poses, weight=weight)
         return [posed.get(wish.text) or direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:

@@ -169,7 +169,7 @@ class _Shown:
     weight: float
 
     def price(self, ratio: Float, shown_s: Float, is_usable: NDArray[np.bool_]) -> Float:
-        """Price of showing poses, (..., N), by their ratios and the moments of their clips; of each row one is its own."""
+        """Price of showing poses, (..., N), by ratios and moments; in each row the clip's own nearest is admitted."""
         clip, at_s = self.wish.pose_moment
         is_clip = np.array([name == clip for name in self.clip_ids] or [False])[self.graph.clip_index]
         off_s = np.where(is_clip & is_usable, np.abs(shown_s - at_s), np.inf)

@@ -57,7 +57,7 @@ class PathCosts:
     seam: float = 0.5
     transition: float = 1.0
     transition_scale: float | None = None
-    rough: float = 2.0
+    rough: float = 4.0
     warp: float = 0.1
     leaving: float = 8.0
     warp_outside: float = 8.0
