@@ -160,6 +160,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
             stretch_price=price if price.any() else None,
             interval_price=terms.interval_price if terms.interval_price.any() else None,
             step_price=terms.step_price,
+            from_any=terms.from_any,
         )
 
     found = find_alternatives(graph, asked.alternative, find=lambda price: find(price, terms.admissible))
@@ -198,11 +199,15 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """What is wished of a dance, for the search: (K, N) admitted, (K, N) priced, and prices of single steps."""
+    """What is wished of a dance, for the search: (K, N) admitted, (K, N) priced, and prices of single steps.
+
+    ``from_any`` says whether a pose is wished for at the start.
+    """
 
     admissible: NDArray[np.bool_]
     interval_price: Float
     step_price: StepPrice
+    from_any: bool
 
 
 def terms_of(
@@ -210,14 +215,15 @@ def terms_of(
 ) -> Terms:
     """Gather what a search is to keep and to pay; dg.Failure where pins conflict."""
     mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
+    from_any = any(pin.steps and pin.first == 0 for pin in pins)
     if not asked.is_soft:
         if pins:
             refuse_conflict(known, song, pins, asked, costs)
             mask = mask & admitted(pins, *mask.shape)
-        return Terms(mask, strength, step_price(pins))
+        return Terms(mask, strength, step_price(pins), from_any)
     soft = [replace(pin, steps=_softened(pin)) for pin in pins]
     price = strength + np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH) if pins else strength
-    return Terms(mask, price, step_price(soft))
+    return Terms(mask, price, step_price(soft), from_any)
 
 
 def _softened(pin: Pin) -> StepPrice:
@@ -349,10 +355,21 @@ def path_costs(settings: PathSettings) -> PathCosts:
     )
 
 
-def search(graph: MotionGraph, beat_s: Float, costs: PathCosts, **wanted: Any) -> Path:  # noqa: ANN401 - find_path's
-    """Find the path within the hard bounds from the first beat of a clip, else from any beat, else past bounds."""
+def search(
+    graph: MotionGraph,
+    beat_s: Float,
+    costs: PathCosts,
+    *,
+    from_any: bool = False,
+    **wanted: Any,  # noqa: ANN401 - find_path's
+) -> Path:
+    """Find the path within the hard bounds from the first beat of a clip, else from any beat, else past bounds.
+
+    Where ``from_any``, the first beat of a clip is not preferred: a pose is wished for at the start.
+    """
     reason: InfeasiblePathError | None = None
-    for starts, strict in (("first", True), ("any", True), ("first", False), ("any", False)):
+    each = ("any",) if from_any else ("first", "any")
+    for starts, strict in ((starts, strict) for strict in (True, False) for starts in each):
         try:
             return find_path(graph, beat_s, costs=costs, starts=starts, strict=strict, **wanted)  # type: ignore[arg-type]
         except InfeasiblePathError as error:

@@ -138,15 +138,16 @@ def test_alternatives_differ(studio, dance):
 
 def test_a_start_pose_and_an_end_pose(studio, dance):
     """The first and the last frame stand as the clips do at those moments, and so does a beat between."""
-    asked = ["start=pose:kaede-rock@1.2", "5.25=pose:kaede-rock@2.1", "end=pose:ayame-step@3"]
+    asked = ["start=pose:kaede-rock@1.25", "5.25=pose:kaede-rock@2.25", "end=pose:ayame-step@3.25"]
     outcome = dance(pins=asked)
     assert outcome.status == 0, outcome.troubles
     told = outcome.facts["pins"]
     assert [pin["pin"] for pin in told] == asked
     assert all(pin["is_kept"] for pin in told)
-    assert all(pin["distance_m"] < 0.15 for pin in told)
+    assert all(pin["distance_m"] < 0.02 for pin in told)
+    assert [pin["shown_clip_id"] for pin in told] == ["kaede-rock", "kaede-rock", "ayame-step"]
     assert told[0]["at_s"] == 0.0
-    assert told[2]["at_s"] == pytest.approx(12.0, abs=0.2)
+    assert told[2]["at_s"] == pytest.approx(13.5, abs=0.2)
     assert "cm from it in the mean" in outcome.report
     poses = {
         clip: pl.read_parquet(
@@ -155,10 +156,10 @@ def test_a_start_pose_and_an_end_pose(studio, dance):
         for clip in ("kaede-rock", "ayame-step")
     }
     frames = pl.read_parquet(studio / "lake" / "dance_pose" / "beat|graph.parquet", glob=False)
-    for row, clip, at_s in ((0, "kaede-rock", 1.2), (-1, "ayame-step", 3.0)):
+    for row, clip, at_s in ((0, "kaede-rock", 1.25), (-1, "ayame-step", 3.25)):
         wanted = poses[clip].filter((pl.col("time_s") - at_s).abs() < 0.51 / 30)["position_xyz_m"].to_list()[0]
         height = [joint[1] for joint in frames["position_xyz_m"].to_list()[row]]
-        assert max(abs(h - joint[1]) for h, joint in zip(height, wanted, strict=True)) < 0.3
+        assert max(abs(h - joint[1]) for h, joint in zip(height, wanted, strict=True)) < 0.05
 
 
 def test_poses_that_cannot_be_shown_are_refused_with_ways_out(dance):
