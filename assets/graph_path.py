@@ -20,7 +20,7 @@ from assets.pose_pins import Poses, to_pose_pins
 from assets.sources import Studio, brief_of, request_of
 from kernels.assembly.timing import blend_widths, cover, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
-from kernels.graph.costs import PathCosts, intensity_price, weight_scale
+from kernels.graph.costs import PathCosts, intensity_price
 from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, to_choreography
 from kernels.graph.pins import Pin, Reach, admitted, find_conflict, step_price
 from kernels.graph.program import StepPrice
@@ -35,7 +35,7 @@ SOFT_WISH = 1.0
 """Price of a beat that a soft wish would have otherwise: the document's, about that of a seam."""
 
 POSE_WEIGHT = 8.0
-"""Price of a pose as unlike the one that is wished as a poor seam's two: worth several seams to come nearer."""
+"""Price of a pose as far as it may be from the one that is wished: several seams are made to come nearer."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
     """
     graph = known.graph
     costs = path_costs(settings.path)
-    pins = pins_of(known, song, asked, costs)
+    pins = pins_of(known, song, asked)
     if not known.is_allowed.any() and len(known.is_allowed):
         raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
     strength = strength_price(known, song, settings.path)
@@ -267,14 +267,14 @@ def heard_song(
     return SongBeats(grid_s, beats, duration_s, intensity, repeats)
 
 
-def pins_of(known: Catalogue, song: SongBeats, asked: Direction, costs: PathCosts) -> list[Pin]:
+def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
     """Bring what is wished onto beats and nodes; dg.Failure where a pin names no place of the song."""
     try:
         posed: dict[str, Pin] = {}
         if any(wish.pose for wish in asked.wishes):
             if known.poses is None:
                 raise ValueError("poses: want those of the clips where a pin wishes for one, got none")
-            weight = POSE_WEIGHT / weight_scale(known.graph, costs)
+            weight = POSE_WEIGHT / known.poses.threshold
             posed = to_pose_pins(asked.wishes, song, known.graph, known.clip_ids, known.poses, weight=weight)
         return [posed.get(wish.text) or direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:

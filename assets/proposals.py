@@ -178,7 +178,7 @@ def _solved(
     The first one is the search's own; those after it are tried for what the ones before cannot have.
     """
     graph, costs = known.graph, path_costs(settings)
-    pins = pins_of(known, song, asked, costs)
+    pins = pins_of(known, song, asked)
     terms = terms_of(known, song, pins, asked, costs, strength_price(known, song, settings))
     mask = np.ascontiguousarray(terms.admissible)
     every = np.flatnonzero(known.is_allowed)
