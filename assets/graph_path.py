@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from assets import direction, licences, matching_tables, plots
 from assets.danced import Danced
-from assets.direction import DirectionError, Nodes
+from assets.direction import GRAPH_PARTS, DirectionError, Nodes, Parts
 from assets.direction import Song as SongBeats
 from assets.partitions import alternative_number
 from assets.sources import Studio, brief_of, request_of
@@ -20,7 +20,7 @@ from kernels.assembly.timing import blend_widths, cover, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts, intensity_price
 from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
-from kernels.graph.pins import Pin, Reach, admitted, find_conflict
+from kernels.graph.pins import Conflict, Pin, Reach, admitted, find_conflict
 from kernels.graph.structure import structure_pins
 from kernels.types import BeatGrid, Choreography, Float, Int, MotionGraph
 from schemas.keys import source_clip
@@ -117,7 +117,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
         If no dance can be had, or not with these pins; its metadata hold the conflict and the ways out.
     """
     graph = known.graph
-    pins = pins_of(known, song, asked)
+    pins = pins_of(known.nodes, song, asked)
     mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
     if not known.is_allowed.any() and len(known.is_allowed):
         raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
@@ -201,10 +201,10 @@ def heard_song(
     return SongBeats(grid_s, beats, duration_s, intensity, repeats)
 
 
-def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
+def pins_of(nodes: Nodes, song: SongBeats, asked: Direction) -> list[Pin]:
     """Bring what is wished onto beats and nodes; dg.Failure where a pin names no place of the song."""
     try:
-        return [direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
+        return [direction.to_pin(wish, song, nodes) for wish in asked.wishes]
     except DirectionError as error:
         facts = {
             "conflict": dg.MetadataValue.json([str(error).partition(": ")[0]]),
@@ -220,27 +220,24 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
     usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
     if not reach.is_danceable:
         return  # the search says why there is no dance at all
-    conflict = find_conflict(
-        reach,
-        usable,
-        choices=[
-            {name: nodes & known.is_allowed for name, nodes in known.nodes.instead_of(w).items()} for w in asked.wishes
-        ],
-    )
-    if conflict is None:
-        return
-    told = direction.sentences(conflict, usable, asked.wishes, song, known.nodes)
-    raise dg.Failure(
-        "; ".join(told),
-        metadata={
-            "conflict": dg.MetadataValue.json([asked.wishes[i].text for i in conflict.pin_index]),
-            "why": told[0],
-            "ways_out": dg.MetadataValue.json(
-                [direction.way_out(way, usable, asked.wishes, song) for way in conflict.ways_out]
-            ),
-        },
-        allow_retries=False,
-    )
+    choices = [{n: m & known.is_allowed for n, m in known.nodes.instead_of(wish).items()} for wish in asked.wishes]
+    conflict = find_conflict(reach, usable, choices=choices)
+    if conflict is not None:
+        raise conflict_failure(conflict, usable, asked, song, known.nodes)
+
+
+def conflict_failure(
+    conflict: Conflict, pins: Sequence[Pin], asked: Direction, song: SongBeats, nodes: Nodes, parts: Parts = GRAPH_PARTS
+) -> dg.Failure:
+    """Say which pins cannot be kept and what would help, for a person and, in the metadata, for a machine."""
+    told = direction.sentences(conflict, pins, asked.wishes, song, nodes, parts)
+    ways = [direction.way_out(way, pins, asked.wishes, song) for way in conflict.ways_out]
+    facts: dict[str, Any] = {
+        "conflict": dg.MetadataValue.json([asked.wishes[i].text for i in conflict.pin_index]),
+        "why": told[0],
+        "ways_out": dg.MetadataValue.json(ways),
+    }
+    return dg.Failure("; ".join(told), metadata=facts, allow_retries=False)
 
 
 def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:

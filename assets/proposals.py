@@ -173,7 +173,7 @@ def _solved(
     """
     graph, costs = known.graph, path_costs(settings)
     n_nodes, n_beats = len(graph.clip_index), len(song.grid_s) - 1
-    pins = pins_of(known, song, asked)
+    pins = pins_of(known.nodes, song, asked)
     mask = np.ascontiguousarray(np.broadcast_to(known.is_allowed, (n_beats, n_nodes)))
     wish = strength_price(known, song, settings)
     if pins and asked.is_soft:

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +116,20 @@ def admitted(pins: Sequence[Pin], n_intervals: int, n_nodes: int) -> Mask:
     return mask
 
 
+class Danceable(Protocol):
+    """What tells whether pins can be kept; pins count in music intervals."""
+
+    n_intervals: int
+
+    def keeps(self, pins: Sequence[Pin]) -> bool:
+        """Whether some dance of the whole song keeps all of these."""
+        ...
+
+    def fits(self, pin: Pin) -> bool:
+        """Whether each interval of a pin has something that is admitted and in tempo, reached or not."""
+        ...
+
+
 class Reach:
     """Whether a dance of a song can keep pins: the reachability part of the path's program, asked many times.
 
@@ -194,13 +209,13 @@ class Reach:
 
 
 def find_conflict(
-    reach: Reach, pins: Sequence[Pin], *, choices: Sequence[Mapping[str, Mask]] | None = None
+    reach: Danceable, pins: Sequence[Pin], *, choices: Sequence[Mapping[str, Mask]] | None = None
 ) -> Conflict | None:
     """Find the fewest pins that cannot be kept together, and what would help.
 
     Parameters
     ----------
-    reach : Reach of a song that can be danced without pins
+    reach : Danceable, of a song that can be danced without pins
     pins : as the director gave them
     choices : for each pin, other wishes to try in its place, by name: (N,) bool; the first that does is taken
 
@@ -235,7 +250,7 @@ def find_conflict(
     return Conflict(smallest, _reason(reach, [pins[i] for i in smallest]), _ways_out(reach, pins, smallest, choices))
 
 
-def _reason(reach: Reach, pins: Sequence[Pin]) -> str:
+def _reason(reach: Danceable, pins: Sequence[Pin]) -> str:
     if len(pins) > 1:
         meet = range(max(pin.first for pin in pins), min(pin.last for pin in pins))
         return "same_time" if meet and not np.all([pin.nodes for pin in pins], axis=0).any() else "path"
@@ -245,7 +260,7 @@ def _reason(reach: Reach, pins: Sequence[Pin]) -> str:
 
 
 def _ways_out(
-    reach: Reach, pins: Sequence[Pin], conflict: tuple[int, ...], choices: Sequence[Mapping[str, Mask]] | None
+    reach: Danceable, pins: Sequence[Pin], conflict: tuple[int, ...], choices: Sequence[Mapping[str, Mask]] | None
 ) -> tuple[WayOut, ...]:
     """Try to move each conflicting pin, nearest beats first, and to ask for something else there."""
     found: list[WayOut] = []

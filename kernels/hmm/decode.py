@@ -1,0 +1,363 @@
+"""The most probable dance in recordings: the model of the dancer and what the recordings let be joined, in one program.
+
+Viterbi over basic motions alone knows nothing of the recordings: what it chooses may have to be put together from
+pieces that do not fit. Here the hidden state is a recorded motion. It pays, in natural log units, what its basic motion
+pays by the model (transition, music), and beside that what can be seen of it: its pace, a seam where it does not go on
+in its clip, a beat on which the body does not visibly stop.
+
+Conventions
+-----------
+``I`` recorded motions of ``K`` basic motions; a grid of ``G`` intervals, of which a motion takes 1 to ``D``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kernels.hmm.durations import LEAST_WARP, MOST_WARP
+from kernels.hmm.instances import Motions, warp_cost
+from kernels.hmm.seams import Ends, seam_cost
+from kernels.hmm.viterbi import InfeasibleSpansError
+from kernels.types import Float, Int
+
+N_NEAREST, N_EACH_STATE = 24, 48
+"""Links of each motion: to so many whose seams are cheapest, and to so many shared evenly among all basic motions."""
+
+FAR = 8.0
+"""Price of a seam to any other motion: dear, but there is always one."""
+
+MISSED_BEAT = 2.0
+"""Price of a beat on which the body does not visibly stop."""
+
+ROUNDS = 5
+BLOCK = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """Which motion may follow which, by target: those into motion j are ``first[j]`` to ``first[j + 1]``.
+
+    Parameters
+    ----------
+    first : (I + 1,) int64
+    source : (E,) int64, motions that end
+    cost : (E,) float64, model and seam together
+    """
+
+    first: Int
+    source: Int
+    cost: Float
+
+
+def link(motions: Motions, ends: Ends, log_transition: Float, *, seam_weight: float) -> Links:
+    """Link every motion to the one that goes on in its clip, and to those that are cheapest to cut to.
+
+    Parameters
+    ----------
+    motions : Motions of I, every state known
+    ends : Ends of them
+    log_transition : (K, K) float
+    seam_weight : float, >= 0
+
+    Returns
+    -------
+    Links
+    """
+    n, state = len(motions.state), motions.state
+    each = [np.flatnonzero(state == k) for k in range(len(log_transition))]
+    n_each = max(N_EACH_STATE // max(len(each), 1), 1)
+    after = motions.following
+    parts = [(np.flatnonzero(after >= 0), after[after >= 0], np.zeros(int((after >= 0).sum())))]
+    for start in range(0, n, BLOCK):
+        row = np.arange(start, min(start + BLOCK, n))
+        cost = seam_weight * seam_cost(ends, row, np.arange(n))
+        cost[row - start, row] = np.inf  # not the same over again
+        picked = [_cheapest(cost, np.arange(n), N_NEAREST), *(_cheapest(cost, of, n_each) for of in each if len(of))]
+        column = np.concatenate(picked, axis=1)
+        source = np.repeat(row, column.shape[1])
+        parts.append((source, column.reshape(-1), cost[source - start, column.reshape(-1)]))
+    source, target, cost = (np.concatenate([p[i] for p in parts]) for i in range(3))
+    # Of links between the same two motions the cheapest stays.
+    order = np.lexsort((cost, source, target))
+    source, target, cost = source[order], target[order], cost[order]
+    kept = np.append(True, (np.diff(source) != 0) | (np.diff(target) != 0)) & np.isfinite(cost)
+    source, target, cost = source[kept], target[kept], cost[kept]
+    first = np.searchsorted(target, np.arange(n + 1))
+    return Links(first, source, cost - log_transition[state[source], state[target]])
+
+
+def _cheapest(cost: Float, column: Int, n: int) -> Int:
+    """Of some columns the n cheapest of each row, (rows, min(n, columns))."""
+    if len(column) <= n:
+        return np.broadcast_to(column, (len(cost), len(column)))
+    return np.asarray(column[np.argpartition(cost[:, column], n - 1, axis=1)[:, :n]], np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A dance as recorded motions, (S,) int64 each: the motion, the interval it starts with, intervals it takes."""
+
+    motion: Int
+    start: Int
+    length: Int
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """What each motion costs by itself wherever it may be danced: for every start and length, motions and prices.
+
+    ``at[k][d - 1]`` holds (n,) motions that may take the d intervals from k, and their (n,) prices.
+    """
+
+    at: Sequence[Sequence[tuple[Int, Float]]]
+
+    @property
+    def n_intervals(self) -> int:
+        """Number of intervals, G."""
+        return len(self.at)
+
+
+def place(
+    motions: Motions,
+    grid_s: Float,
+    log_music: Float,
+    *,
+    longest: int,
+    is_beat: NDArray[np.bool_],
+    accent: Float,
+    warp_weight: float = 1.0,
+) -> Places:
+    """Price every motion in every place of the grid where it can be danced within the warp bounds.
+
+    Parameters
+    ----------
+    motions : Motions of I, every state known
+    grid_s : (G + L + 1,) float, seconds, increasing; L >= longest - 1 points beyond the grid
+    log_music : (G, K) float, log likelihood of what is heard in each interval
+    longest : int, D
+    is_beat : (G + L + 1,) bool, whether a point of the grid is a beat
+    accent : (I,) float, 0 to 1, how visibly the body stops at the end of each motion
+    warp_weight : float, >= 0
+
+    Returns
+    -------
+    Places
+    """
+    n_intervals = len(log_music)
+    length_s = motions.end_s - motions.start_s
+    order = np.argsort(length_s, kind="stable")
+    ranked = length_s[order]
+    heard = np.concatenate([np.zeros((1, log_music.shape[1])), np.cumsum(log_music, axis=0)])
+    at = []
+    for k in range(n_intervals):
+        here = []
+        for d in range(1, longest + 1):
+            span_s = float(grid_s[k + d] - grid_s[k])
+            a, b = np.searchsorted(ranked, [span_s / MOST_WARP, span_s / LEAST_WARP + 1e-12])
+            fits = np.sort(order[a:b])
+            end = min(k + d, n_intervals)
+            price = warp_weight * warp_cost(np.asarray(span_s), length_s[fits])
+            at_k = np.full(len(fits), k)
+            price = price + missed_beats(is_beat, at_k, at_k + d, accent[fits])
+            price = price - (heard[end] - heard[k])[motions.state[fits]]
+            here.append((fits, price))
+        at.append(here)
+    return Places(at)
+
+
+def missed_beats(is_beat: NDArray[np.bool_], start: Int, end: Int, accent: Float) -> Float:
+    """Price the beats on which motions do not visibly stop: those they pass, and those they end on.
+
+    Parameters
+    ----------
+    is_beat : (P,) bool, whether a point of the grid is a beat
+    start, end : (n,) int64, points where motions start and end
+    accent : (n,) float, 0 to 1, how visibly each stops at its end
+
+    Returns
+    -------
+    (n,) float64, >= 0
+    """
+    counted = np.cumsum(is_beat)
+    passed = counted[end - 1] - counted[start]
+    return np.asarray(MISSED_BEAT * (passed + is_beat[end] * (1.0 - accent)), np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Wish:
+    """In the intervals first <= k < last only motions of the (I,) mask are wished for."""
+
+    first: int
+    last: int
+    motions: NDArray[np.bool_]
+
+    def touched(self, start: int, length: int) -> int:
+        """Count the intervals of the wish under a span."""
+        return max(min(self.last, start + length) - max(self.first, start), 0)
+
+
+def keep_wishes(places: Places, wishes: Sequence[Wish], *, price: float = np.inf) -> Places:
+    """Price what wishes do not admit, each interval; at an infinite price it is not danced at all.
+
+    Parameters
+    ----------
+    places : Places
+    wishes : in any order; where they overlap, each counts
+    price : float, > 0
+
+    Returns
+    -------
+    Places
+    """
+    at = []
+    for k, here in enumerate(places.at):
+        row = []
+        for d, (fits, cost) in enumerate(here, start=1):
+            for wish in wishes:
+                n_touched = wish.touched(k, d)
+                if n_touched:
+                    cost = np.where(wish.motions[fits], cost, cost + price * n_touched)
+            kept = np.isfinite(cost)
+            row.append((fits[kept], cost[kept]))
+        at.append(row)
+    return Places(at)
+
+
+def decode(
+    motions: Motions,
+    links: Links,
+    places: Places,
+    log_initial: Float,
+    log_transition: Float,
+    *,
+    price: Float,
+) -> tuple[Chain, float]:
+    """Find the dance that costs least.
+
+    Parameters
+    ----------
+    motions : Motions of I, every state known
+    links : Links between them
+    places : Places
+    log_initial, log_transition : (K,) and (K, K) float, natural log
+    price : (I,) float
+        What each motion costs beside, wherever it is danced.
+
+    Returns
+    -------
+    Chain, and its cost
+
+    Raises
+    ------
+    InfeasibleSpansError
+        If no sequence of motions covers the grid.
+    """
+    n_all, n = places.n_intervals, len(motions.state)
+    far = _Far(motions, log_transition)
+    score = np.full((n_all + 1, n), np.inf)
+    came, length = np.zeros((n_all + 1, n), np.int32), np.zeros((n_all + 1, n), np.int32)
+    linked = np.flatnonzero(np.diff(links.first))
+    for k in range(n_all):
+        enter = -log_initial[motions.state]
+        if k:
+            if not np.isfinite(score[k]).any():
+                continue
+            enter = far.enter(score[k])
+            best = np.minimum.reduceat(score[k][links.source] + links.cost, links.first[linked])
+            enter[linked] = np.minimum(enter[linked], best)
+        enter = enter + price
+        for d, (fits, cost) in enumerate(places.at[k], start=1):
+            end = min(k + d, n_all)
+            value = enter[fits] + cost
+            better = value < score[end][fits]
+            here = fits[better]
+            score[end][here], came[end][here], length[end][here] = value[better], k, d
+    if not np.isfinite(score[n_all]).any():
+        reached = np.isfinite(score).any(axis=1)
+        raise InfeasibleSpansError(int(np.flatnonzero(reached)[-1]) if reached.any() else 0)
+    return _back(score, came, length, links, far), float(score[n_all].min())
+
+
+class _Far:
+    """Seams to motions that are no neighbours: from the cheapest motion of each basic motion to all of another."""
+
+    def __init__(self, motions: Motions, log_transition: Float) -> None:
+        self.state, self.log_transition = motions.state, log_transition
+        self.members = [np.flatnonzero(motions.state == k) for k in range(len(log_transition))]
+
+    def enter(self, score: Float) -> Float:
+        best = np.array([score[m].min() if len(m) else np.inf for m in self.members])
+        return np.asarray(((best[:, None] - self.log_transition).min(axis=0) + FAR)[self.state], np.float64)
+
+    def source(self, score: Float, target: int) -> tuple[int, float]:
+        cost = score - self.log_transition[self.state, self.state[target]] + FAR
+        at = int(np.argmin(cost))
+        return at, float(cost[at])
+
+
+def _back(score: Float, came: Int, length: Int, links: Links, far: _Far) -> Chain:
+    """Follow the cheapest dance from its end to its start."""
+    at = len(score) - 1
+    motion = int(np.argmin(score[at]))
+    found: list[tuple[int, int, int]] = []
+    while True:
+        start = int(came[at, motion])
+        found.append((motion, start, int(length[at, motion])))
+        if start == 0:
+            break
+        here = slice(int(links.first[motion]), int(links.first[motion + 1]))
+        into = score[start][links.source[here]] + links.cost[here]
+        source, cost = far.source(score[start], motion)
+        if len(into) and into.min() <= cost:
+            source = int(links.source[here][int(np.argmin(into))])
+        motion, at = source, start
+    rows = np.array(found[::-1], np.int64)
+    return Chain(rows[:, 0], rows[:, 1], rows[:, 2])
+
+
+def decode_varied(
+    motions: Motions,
+    links: Links,
+    places: Places,
+    log_initial: Float,
+    log_transition: Float,
+    *,
+    price: Float,
+    repetition_weight: float,
+) -> Chain:
+    """Find a dance that costs little, showing the same again priced; arguments as :func:`decode`.
+
+    Repetition is no sum over neighbours: motions shown more than once become dearer from round to round, and the best
+    dance met, by its true cost, is kept.
+
+    Parameters
+    ----------
+    repetition_weight : float, >= 0
+        Cost of every showing of a motion after its first.
+
+    Returns
+    -------
+    Chain
+
+    Raises
+    ------
+    InfeasibleSpansError
+        As :func:`decode`.
+    """
+    again = np.zeros(len(motions.state))
+    best = np.inf, Chain(*np.zeros((3, 0), np.int64))
+    for _ in range(ROUNDS if repetition_weight > 0 else 1):
+        found, cost = decode(motions, links, places, log_initial, log_transition, price=price + again)
+        uses = np.bincount(found.motion, minlength=len(again))
+        shown_again = np.maximum(uses - 1, 0)
+        cost += float((repetition_weight * shown_again).sum() - (again * uses).sum())
+        if cost < best[0] - 1e-9:
+            best = cost, found
+        if not shown_again.any():
+            break
+        again = again + 0.25 * repetition_weight * shown_again
+    return best[1]
