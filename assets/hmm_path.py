@@ -190,6 +190,7 @@ def by_hmm(
     pins = hmm_pins.kept_or_refused(reach, dancer.nodes, song, asked)
     wishes = [decode.Wish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
     wished = decode.keep_wishes(places, wishes, price=hmm_pins.price(asked) / music.parts) if wishes else places
+    crowded = decode.crowded_cost(music.grid_s, song.duration_s, blend_s=settings.dance.blend_s)
     lasting = _lasting(dancer, music, wished)
     model = dancer.model
     if warmth > 0:
@@ -205,9 +206,9 @@ def by_hmm(
             None,
         )
     else:
-        spans, decoded = _decoded(dancer, wished, ends, settings, seed)
+        spans, decoded = _decoded(dancer, wished, ends, crowded, settings, seed)
     chosen = choose_recordings(
-        motions, ends, wished, spans, decoded, is_beat=music.is_beat, grid_s=music.grid_s, settings=weights
+        motions, ends, wished, spans, decoded, crowded, is_beat=music.is_beat, grid_s=music.grid_s, settings=weights
     )
     edge_s = np.append(music.grid_s[spans.start], music.grid_s[spans.start[-1] + spans.length[-1]])
     steps, span_of = to_choreography(
@@ -269,7 +270,7 @@ def _lasting(dancer: Dancer, music: Music, places: decode.Places) -> Float:
 
 
 def _decoded(
-    dancer: Dancer, places: decode.Places, ends: Ends, settings: Settings, seed: int
+    dancer: Dancer, places: decode.Places, ends: Ends, crowded: Float, settings: Settings, seed: int
 ) -> tuple[Spans, decode.Chain]:
     """Find the cheapest dance in recordings."""
     model, motions, weights = dancer.model, dancer.motions, settings.hmm_path
@@ -283,6 +284,7 @@ def _decoded(
         model.log_initial,
         model.log_transition,
         price=price,
+        crowded=crowded,
         repetition_weight=weights.repetition_weight,
     )
     return Spans(motions.state[chain.motion], chain.start, chain.length), chain

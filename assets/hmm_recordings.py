@@ -18,8 +18,11 @@ from kernels.hmm.seams import REACH_S, Ends, concatenate_ends, own_cost, seam_co
 from kernels.hmm.viterbi import Spans
 from kernels.matching.path import Candidates, Chosen, continues
 from kernels.motion.velocity import accents, jerk_around, usable_frames
+from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float
 from schemas.settings import HmmPathSettings
+
+ON_FEET: Float = np.array([name.endswith("Foot") for name in JOINTS], np.float64)
 
 
 def ends_of(motions: Motions, clip_ids: tuple[str, ...], canonical_pose: Stored, *, blend_s: float) -> Ends:
@@ -46,15 +49,18 @@ def ends_of(motions: Motions, clip_ids: tuple[str, ...], canonical_pose: Stored,
 def _ends(moved: tables.CanonicalClip, start_s: Float, end_s: Float, blend_s: float) -> Ends:
     n = len(start_s)
     time_s = np.minimum(np.concatenate([start_s, end_s]), moved.duration_s)
-    pose = beat_features(
-        moved.rotation_wxyz, moved.position_xyz_m, frame_rate_hz=moved.frame_rate_hz, time_s=time_s
-    ).pose
+    rate_hz = moved.frame_rate_hz
+    seen = moved.rotation_wxyz, moved.position_xyz_m
+    pose = beat_features(*seen, frame_rate_hz=rate_hz, time_s=time_s).pose.linear
+    feet = beat_features(*seen, frame_rate_hz=rate_hz, time_s=time_s, weight=ON_FEET, velocity_time_s=0.0).pose.linear
     peak, usual = jerk_around(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s, reach_s=REACH_S)
     first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
     half_s = max(blend_s / 2, 1e-9)
     return Ends(
-        pose.linear[:n],
-        pose.linear[n:],
+        pose[:n],
+        pose[n:],
+        feet[:n],
+        feet[n:],
         accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s[n:]),
         peak[:n],
         peak[n:],
@@ -79,6 +85,7 @@ def choose_recordings(
     places: Places,
     spans: Spans,
     decoded: Chain | None,
+    crowded: Float,
     *,
     is_beat: NDArray[np.bool_],
     grid_s: Float,
@@ -93,6 +100,7 @@ def choose_recordings(
     places : Places, wishes included
     spans : Spans of S
     decoded : Chain the spans were taken from, or None
+    crowded : (G + D,) float, >= 0, what a seam at each point of the grid costs beside
     is_beat : (G + D,) bool
     grid_s : (G + D,) float, seconds
     settings : HmmPathSettings
@@ -115,8 +123,8 @@ def choose_recordings(
     ]
     goes_on = [continues(a, b) for a, b in itertools.pairwise(candidates)]
     seam = [
-        np.where(on, 0.0, settings.seam_weight * seam_cost(ends, a, b))
-        for on, (a, b) in zip(goes_on, itertools.pairwise(short), strict=True)
+        np.where(on, 0.0, settings.seam_weight * seam_cost(ends, a, b) + crowded[start])
+        for on, (a, b), start in zip(goes_on, itertools.pairwise(short), spans.start[1:], strict=True)
     ]
     choice, repetition, total = instances.choose(short, prices, seam, repetition_weight=settings.repetition_weight)
     pairs = list(itertools.pairwise(choice))

@@ -33,6 +33,9 @@ FAR = 8.0
 MISSED_BEAT = 2.0
 """Price of a beat on which the body does not visibly stop."""
 
+CROWDED = 6.0
+"""Price of a seam at the very start or end of the song: its blend has no room."""
+
 ROUNDS = 5
 BLOCK = 256
 
@@ -46,11 +49,13 @@ class Links:
     first : (I + 1,) int64
     source : (E,) int64, motions that end
     cost : (E,) float64, model and seam together
+    is_seam : (E,) bool, whether the source does not go on in the target
     """
 
     first: Int
     source: Int
     cost: Float
+    is_seam: NDArray[np.bool_]
 
 
 def link(motions: Motions, ends: Ends, log_transition: Float, *, seam_weight: float) -> Links:
@@ -87,7 +92,7 @@ def link(motions: Motions, ends: Ends, log_transition: Float, *, seam_weight: fl
     kept = np.append(True, (np.diff(source) != 0) | (np.diff(target) != 0)) & np.isfinite(cost)
     source, target, cost = source[kept], target[kept], cost[kept]
     first = np.searchsorted(target, np.arange(n + 1))
-    return Links(first, source, cost - log_transition[state[source], state[target]])
+    return Links(first, source, cost - log_transition[state[source], state[target]], after[source] != target)
 
 
 def _cheapest(cost: Float, column: Int, n: int) -> Int:
@@ -183,8 +188,25 @@ def missed_beats(is_beat: NDArray[np.bool_], start: Int, end: Int, accent: Float
     (n,) float64, >= 0
     """
     counted = np.cumsum(is_beat)
-    passed = counted[end - 1] - counted[start]
+    passed: Int = counted[end - 1] - counted[start]
     return np.asarray(MISSED_BEAT * (passed + is_beat[end] * (1.0 - accent)), np.float64)
+
+
+def crowded_cost(grid_s: Float, end_s: float, *, blend_s: float) -> Float:
+    """Price seams so near to the start or end of a song that half a blend has no room.
+
+    Parameters
+    ----------
+    grid_s : (P,) float, seconds
+    end_s : float, seconds, end of the song; it starts at 0
+    blend_s : float, seconds, >= 0
+
+    Returns
+    -------
+    (P,) float64, 0 to :data:`CROWDED`
+    """
+    room = np.clip(np.minimum(grid_s, end_s - grid_s) / max(blend_s / 2, 1e-9), 0.0, 1.0)
+    return np.asarray(CROWDED * (1.0 - room), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,6 +257,7 @@ def decode(
     log_transition: Float,
     *,
     price: Float,
+    crowded: Float,
 ) -> tuple[Chain, float]:
     """Find the dance that costs least.
 
@@ -246,6 +269,8 @@ def decode(
     log_initial, log_transition : (K,) and (K, K) float, natural log
     price : (I,) float
         What each motion costs beside, wherever it is danced.
+    crowded : (G,) float, >= 0
+        What a seam at each point of the grid costs beside.
 
     Returns
     -------
@@ -266,8 +291,9 @@ def decode(
         if k:
             if not np.isfinite(score[k]).any():
                 continue
-            enter = far.enter(score[k])
-            best = np.minimum.reduceat(score[k][links.source] + links.cost, links.first[linked])
+            enter = far.enter(score[k]) + crowded[k]
+            into = score[k][links.source] + links.cost + (crowded[k] * links.is_seam if crowded[k] else 0.0)
+            best = np.minimum.reduceat(into, links.first[linked])
             enter[linked] = np.minimum(enter[linked], best)
         enter = enter + price
         for d, (fits, cost) in enumerate(places.at[k], start=1):
@@ -279,7 +305,7 @@ def decode(
     if not np.isfinite(score[n_all]).any():
         reached = np.isfinite(score).any(axis=1)
         raise InfeasibleSpansError(int(np.flatnonzero(reached)[-1]) if reached.any() else 0)
-    return _back(score, came, length, links, far), float(score[n_all].min())
+    return _back(score, came, length, links, far, crowded), float(score[n_all].min())
 
 
 class _Far:
@@ -299,7 +325,9 @@ class _Far:
         return at, float(cost[at])
 
 
-def _back(score: Float, came: Int, length: Int, links: Links, far: _Far) -> Chain:
+def _back(
+    score: Float, came: NDArray[np.int32], length: NDArray[np.int32], links: Links, far: _Far, crowded: Float
+) -> Chain:
     """Follow the cheapest dance from its end to its start."""
     at = len(score) - 1
     motion = int(np.argmin(score[at]))
@@ -310,9 +338,9 @@ def _back(score: Float, came: Int, length: Int, links: Links, far: _Far) -> Chai
         if start == 0:
             break
         here = slice(int(links.first[motion]), int(links.first[motion + 1]))
-        into = score[start][links.source[here]] + links.cost[here]
+        into = score[start][links.source[here]] + links.cost[here] + crowded[start] * links.is_seam[here]
         source, cost = far.source(score[start], motion)
-        if len(into) and into.min() <= cost:
+        if len(into) and into.min() <= cost + crowded[start]:
             source = int(links.source[here][int(np.argmin(into))])
         motion, at = source, start
     rows = np.array(found[::-1], np.int64)
@@ -327,6 +355,7 @@ def decode_varied(
     log_transition: Float,
     *,
     price: Float,
+    crowded: Float,
     repetition_weight: float,
 ) -> Chain:
     """Find a dance that costs little, showing the same again priced; arguments as :func:`decode`.
@@ -351,7 +380,7 @@ def decode_varied(
     again = np.zeros(len(motions.state))
     best = np.inf, Chain(*np.zeros((3, 0), np.int64))
     for _ in range(ROUNDS if repetition_weight > 0 else 1):
-        found, cost = decode(motions, links, places, log_initial, log_transition, price=price + again)
+        found, cost = decode(motions, links, places, log_initial, log_transition, price=price + again, crowded=crowded)
         uses = np.bincount(found.motion, minlength=len(again))
         shown_again = np.maximum(uses - 1, 0)
         cost += float((repetition_weight * shown_again).sum() - (again * uses).sum())
