@@ -189,7 +189,8 @@ def by_hmm(
         raise dg.Failure(_no_length(music, motions.end_s - motions.start_s), allow_retries=False)
     pins = hmm_pins.kept_or_refused(reach, dancer.nodes, song, asked)
     wishes = [decode.Wish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
-    wished = decode.keep_wishes(places, wishes, price=hmm_pins.price(asked) / music.parts) if wishes else places
+    wish_price = hmm_pins.price(asked) / music.parts
+    wished = decode.keep_wishes(places, wishes, price=wish_price) if wishes else places
     crowded = decode.crowded_cost(music.grid_s, song.duration_s, blend_s=settings.dance.blend_s)
     lasting = _lasting(dancer, music, wished)
     model = dancer.model
@@ -225,7 +226,11 @@ def by_hmm(
     width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.dance.blend_s)
     steps = replace(steps, blend_s=width)
     model_cost, music_cost = _model_costs(dancer.model, music, spans)
-    by_span = {**chosen.costs, "model_cost": model_cost, "music_cost": music_cost}
+    unkept = (
+        [w.touched_by(spans.start, spans.length) * ~w.motions[chosen.danced] for w in wishes] if asked.is_soft else []
+    )
+    wish_cost = np.sum([wish_price * n for n in unkept], axis=0) if unkept else np.zeros(len(spans.state))
+    by_span = {**chosen.costs, "wish_cost": wish_cost, "model_cost": model_cost, "music_cost": music_cost}
     is_first = np.append(True, np.diff(span_of) > 0)
     columns = {name: np.where(is_first, values[span_of], 0.0) for name, values in by_span.items()}
     alone = best_spans(dancer.model.log_initial, dancer.model.log_transition, music.log_likelihood, lasting)[0]
@@ -277,12 +282,13 @@ def _decoded(
     price = np.zeros(len(motions.state))
     if not len(dancer.evidence.n_motions):
         price = np.random.default_rng(seed).exponential(UNSURE, len(price))
+    against_usual = model.log_transition + model.entropy_rate
     chain = decode.decode_varied(
         motions,
-        decode.link(motions, ends, model.log_transition, seam_weight=weights.seam_weight),
+        decode.link(motions, ends, against_usual, seam_weight=weights.seam_weight),
         places,
         model.log_initial,
-        model.log_transition,
+        against_usual,
         price=price,
         crowded=crowded,
         repetition_weight=weights.repetition_weight,

@@ -14,15 +14,12 @@ from kernels.graph.features import beat_features
 from kernels.hmm import instances
 from kernels.hmm.decode import Chain, Places, missed_beats
 from kernels.hmm.instances import Motions
-from kernels.hmm.seams import REACH_S, Ends, concatenate_ends, own_cost, seam_cost
+from kernels.hmm.seams import REACH_S, Ends, concatenate_ends, limb_paths, own_cost, seam_cost
 from kernels.hmm.viterbi import Spans
 from kernels.matching.path import Candidates, Chosen, continues
 from kernels.motion.velocity import accents, jerk_around, usable_frames
-from kernels.skeleton.canonical import JOINTS
-from kernels.types import Float
+from kernels.types import Float, Int
 from schemas.settings import HmmPathSettings
-
-ON_FEET: Float = np.array([name.endswith("Foot") for name in JOINTS], np.float64)
 
 
 def ends_of(motions: Motions, clip_ids: tuple[str, ...], canonical_pose: Stored, *, blend_s: float) -> Ends:
@@ -50,17 +47,16 @@ def _ends(moved: tables.CanonicalClip, start_s: Float, end_s: Float, blend_s: fl
     n = len(start_s)
     time_s = np.minimum(np.concatenate([start_s, end_s]), moved.duration_s)
     rate_hz = moved.frame_rate_hz
-    seen = moved.rotation_wxyz, moved.position_xyz_m
-    pose = beat_features(*seen, frame_rate_hz=rate_hz, time_s=time_s).pose.linear
-    feet = beat_features(*seen, frame_rate_hz=rate_hz, time_s=time_s, weight=ON_FEET, velocity_time_s=0.0).pose.linear
+    pose = beat_features(moved.rotation_wxyz, moved.position_xyz_m, frame_rate_hz=rate_hz, time_s=time_s).pose.linear
+    limbs = limb_paths(moved.position_xyz_m, moved.rotation_wxyz[:, 0], frame_rate_hz=rate_hz, time_s=time_s)
     peak, usual = jerk_around(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s, reach_s=REACH_S)
     first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
     half_s = max(blend_s / 2, 1e-9)
     return Ends(
         pose[:n],
         pose[n:],
-        feet[:n],
-        feet[n:],
+        limbs[:n],
+        limbs[n:],
         accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s[n:]),
         peak[:n],
         peak[n:],
@@ -72,10 +68,11 @@ def _ends(moved: tables.CanonicalClip, start_s: Float, end_s: Float, blend_s: fl
 
 @dataclass(frozen=True, eq=False)
 class Recordings:
-    """A recording for each span: candidates, which of them, and costs by column, (S,) each."""
+    """A recording for each span: candidates, which of them, the motions danced, and costs by column, (S,) each."""
 
     candidates: Sequence[Candidates]
     found: Chosen
+    danced: Int
     costs: Mapping[str, Float]
 
 
@@ -142,4 +139,4 @@ def choose_recordings(
         "repetition_cost": repetition,
     }
     joined = np.ones(len(choice), bool)
-    return Recordings(candidates, Chosen(choice, has_seam, joined, seam_costs, repetition, total), costs)
+    return Recordings(candidates, Chosen(choice, has_seam, joined, seam_costs, repetition, total), danced, costs)

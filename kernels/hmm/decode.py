@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.hmm.durations import LEAST_WARP, MOST_WARP
-from kernels.hmm.instances import Motions, warp_cost
+from kernels.hmm.instances import MOST_PRICED, Motions, warp_cost
 from kernels.hmm.seams import Ends, seam_cost
 from kernels.hmm.viterbi import InfeasibleSpansError
 from kernels.types import Float, Int
@@ -36,7 +36,10 @@ MISSED_BEAT = 2.0
 CROWDED = 6.0
 """Price of a seam at the very start or end of the song: its blend has no room."""
 
-ROUNDS = 5
+REPETITION = 0.5
+WINDOW, LOOK_AHEAD = 16, 12
+"""Intervals that are danced at a time, and looked at beyond."""
+
 BLOCK = 256
 
 
@@ -217,9 +220,9 @@ class Wish:
     last: int
     motions: NDArray[np.bool_]
 
-    def touched(self, start: int, length: int) -> int:
-        """Count the intervals of the wish under a span."""
-        return max(min(self.last, start + length) - max(self.first, start), 0)
+    def touched_by(self, start: Int, length: Int) -> Int:
+        """Count the intervals of the wish under spans, (n,) int64."""
+        return np.maximum(np.minimum(self.last, start + length) - np.maximum(self.first, start), 0)
 
 
 def keep_wishes(places: Places, wishes: Sequence[Wish], *, price: float = np.inf) -> Places:
@@ -240,7 +243,7 @@ def keep_wishes(places: Places, wishes: Sequence[Wish], *, price: float = np.inf
         row = []
         for d, (fits, cost) in enumerate(here, start=1):
             for wish in wishes:
-                n_touched = wish.touched(k, d)
+                n_touched = int(wish.touched_by(np.array(k), np.array(d)))
                 if n_touched:
                     cost = np.where(wish.motions[fits], cost, cost + price * n_touched)
             kept = np.isfinite(cost)
@@ -258,6 +261,7 @@ def decode(
     *,
     price: Float,
     crowded: Float,
+    before: int | None = None,
 ) -> tuple[Chain, float]:
     """Find the dance that costs least.
 
@@ -271,6 +275,7 @@ def decode(
         What each motion costs beside, wherever it is danced.
     crowded : (G,) float, >= 0
         What a seam at each point of the grid costs beside.
+    before : int or None, the motion that ends where the grid starts
 
     Returns
     -------
@@ -286,15 +291,17 @@ def decode(
     score = np.full((n_all + 1, n), np.inf)
     came, length = np.zeros((n_all + 1, n), np.int32), np.zeros((n_all + 1, n), np.int32)
     linked = np.flatnonzero(np.diff(links.first))
+    score[0] = np.inf if before is None else np.where(np.arange(n) == before, 0.0, np.inf)
     for k in range(n_all):
-        enter = -log_initial[motions.state]
-        if k:
-            if not np.isfinite(score[k]).any():
-                continue
+        if np.isfinite(score[k]).any():
             enter = far.enter(score[k]) + crowded[k]
             into = score[k][links.source] + links.cost + (crowded[k] * links.is_seam if crowded[k] else 0.0)
-            best = np.minimum.reduceat(into, links.first[linked])
+            best = np.minimum.reduceat(into, links.first[linked]) if len(linked) else np.zeros(0)
             enter[linked] = np.minimum(enter[linked], best)
+        elif k == 0:
+            enter = -log_initial[motions.state]
+        else:
+            continue
         enter = enter + price
         for d, (fits, cost) in enumerate(places.at[k], start=1):
             end = min(k + d, n_all)
@@ -360,13 +367,14 @@ def decode_varied(
 ) -> Chain:
     """Find a dance that costs little, showing the same again priced; arguments as :func:`decode`.
 
-    Repetition is no sum over neighbours: motions shown more than once become dearer from round to round, and the best
-    dance met, by its true cost, is kept.
+    Repetition is no sum over neighbours: the dance is made forwards, window by window, each with a look ahead, and
+    every motion is dearer by how often earlier windows showed it.
 
     Parameters
     ----------
     repetition_weight : float, >= 0
-        Cost of every showing of a motion after its first.
+        Scales the price of a motion that was shown before, :data:`REPETITION` for each time, of at most
+        :data:`MOST_PRICED` times.
 
     Returns
     -------
@@ -377,16 +385,64 @@ def decode_varied(
     InfeasibleSpansError
         As :func:`decode`.
     """
-    again = np.zeros(len(motions.state))
-    best = np.inf, Chain(*np.zeros((3, 0), np.int64))
-    for _ in range(ROUNDS if repetition_weight > 0 else 1):
-        found, cost = decode(motions, links, places, log_initial, log_transition, price=price + again, crowded=crowded)
-        uses = np.bincount(found.motion, minlength=len(again))
-        shown_again = np.maximum(uses - 1, 0)
-        cost += float((repetition_weight * shown_again).sum() - (again * uses).sum())
-        if cost < best[0] - 1e-9:
-            best = cost, found
-        if not shown_again.any():
-            break
-        again = again + 0.25 * repetition_weight * shown_again
-    return best[1]
+    n_all, open_ = places.n_intervals, finishing(places)
+    shown = np.zeros(len(motions.state), np.int64)
+    found: list[tuple[int, int, int]] = []
+    at, last = 0, None
+    while at < n_all:
+        ahead = min(at + WINDOW + LOOK_AHEAD, n_all)
+        chain, _ = decode(
+            motions,
+            links,
+            Places(open_.at[at:ahead]),
+            log_initial,
+            log_transition,
+            price=price + REPETITION * repetition_weight * np.minimum(shown, MOST_PRICED),
+            crowded=crowded[at:],
+            before=last,
+        )
+        rows = zip(chain.motion.tolist(), (chain.start + at).tolist(), chain.length.tolist(), strict=True)
+        kept = [row for row in rows if row[1] < at + WINDOW]
+        found += kept
+        last, start, length = kept[-1]
+        at = start + length
+        np.add.at(shown, [row[0] for row in kept], 1)
+    return Chain(*np.array(found, np.int64).reshape(-1, 3).T)
+
+
+def finishing(places: Places) -> Places:
+    """Take out what nothing could follow to the end of the grid.
+
+    Parameters
+    ----------
+    places : Places
+
+    Returns
+    -------
+    Places
+
+    Raises
+    ------
+    InfeasibleSpansError
+        If nothing covers the grid; ``interval`` is the farthest point that can be reached.
+    """
+    n = places.n_intervals
+    ends = np.zeros(n + 1, bool)
+    ends[n] = True
+    for k in range(n - 1, -1, -1):
+        ends[k] = any(len(fits) and ends[min(k + d, n)] for d, (fits, _) in enumerate(places.at[k], start=1))
+    if not ends[0]:
+        reached = [0]
+        for k in range(n):
+            if k in reached:
+                reached += [min(k + d, n) for d, (fits, _) in enumerate(places.at[k], start=1) if len(fits)]
+        raise InfeasibleSpansError(max(reached))
+    return Places(
+        [
+            [
+                (fits, cost) if ends[min(k + d, n)] else (fits[:0], cost[:0])
+                for d, (fits, cost) in enumerate(row, start=1)
+            ]
+            for k, row in enumerate(places.at)
+        ]
+    )
