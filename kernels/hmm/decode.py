@@ -222,7 +222,9 @@ class Wish:
 
     def touched_by(self, start: Int, length: Int) -> Int:
         """Count the intervals of the wish under spans, (n,) int64."""
-        return np.maximum(np.minimum(self.last, start + length) - np.maximum(self.first, start), 0)
+        return np.asarray(
+            np.maximum(np.minimum(self.last, start + length) - np.maximum(self.first, start), 0), np.int64
+        )
 
 
 def keep_wishes(places: Places, wishes: Sequence[Wish], *, price: float = np.inf) -> Places:
