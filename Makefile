@@ -24,7 +24,7 @@ demo: $(STAMP) ## a made-up studio, the whole pipeline, one dance
 	@$(BIN)/odori demo
 
 test: $(STAMP) ## the tests
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n auto --dist loadfile
 
 lint: $(STAMP) ## style, types, import contracts
 	@$(BIN)/ruff format --check .

@@ -136,7 +136,22 @@ def calibrate_file(
 
 
 def calibrate_recording(recording: Recording, *, settings: CalibrationSettings) -> Calibrated:
-    """Calibrate the body in a recording that no file holds; as :func:`calibrate_file`, on the NumPy references."""
+    """Calibrate the body in a recording that no file holds, on the NumPy references.
+
+    Parameters
+    ----------
+    recording : Recording of the 17 sensors, in any order
+    settings : CalibrationSettings
+
+    Returns
+    -------
+    Calibrated
+
+    Raises
+    ------
+    CalibrationError
+        If sensors are missing or strange, or the recording has a fault that no result may come from.
+    """
     with threadpool_limits(limits=1, user_api="blas"):
         return _calibrate(Suit(recording, 0, 1.0), settings, None, _Watch())
 
@@ -173,7 +188,17 @@ def _stop_at(findings: Sequence[Finding], calibration: Calibration | None, watch
 
 
 def up_axis(gauge: Gauge) -> str:
-    """Axis of the recording's world that points up: X, Y or Z, with a minus where it points down."""
+    """Find the axis of the recording's world that points up most.
+
+    Parameters
+    ----------
+    gauge : Gauge
+
+    Returns
+    -------
+    str
+        ``X``, ``Y`` or ``Z``, with a minus where it points down.
+    """
     up = rotation.apply(rotation.inv(gauge.up_wxyz), np.array([0.0, 1.0, 0.0]))
     axis = int(np.argmax(np.abs(up)))
     return ("-" if up[axis] < 0 else "") + "XYZ"[axis]
@@ -181,6 +206,15 @@ def up_axis(gauge: Gauge) -> str:
 
 def in_order(recording: Recording) -> Recording:
     """Put the sensors of a suit in the order the kernels want.
+
+    Parameters
+    ----------
+    recording : Recording of S sensors
+
+    Returns
+    -------
+    Recording
+        The same readings, sensors as in :data:`kernels.calibration.records.SENSORS`.
 
     Raises
     ------

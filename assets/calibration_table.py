@@ -19,7 +19,17 @@ N_SPANS = 240
 
 
 def from_calibration(clip_id: str, found: Calibrated) -> pa.Table:
-    """Pack the calibration of one recording, 16 rows."""
+    """Pack the calibration of one recording.
+
+    Parameters
+    ----------
+    clip_id : key of the recording's clip
+    found : Calibrated
+
+    Returns
+    -------
+    table ``calibration``, 16 rows, a joint each
+    """
     joints, n = found.calibration.joints, len(JOINTS)
     rest = found.gauge.rest_wxyz[1:]
     in_child = np.stack([joint.in_child_sensor_m for joint in joints])
@@ -71,5 +81,15 @@ def _curves(values: Float) -> pa.Array:
 
 
 def to_curves(column: pa.ChunkedArray) -> Float:
-    """Unpack the curves of one clip's joints, (16, spans)."""
+    """Unpack the curves of one clip's joints.
+
+    Parameters
+    ----------
+    column : a curve's column of table ``calibration``, rows of one clip
+
+    Returns
+    -------
+    (16, spans) float64, metres
+        Spans as in the table, at most :data:`N_SPANS`; (0,) of no rows.
+    """
     return np.array([np.asarray(row, np.float64) for row in column.to_pylist()])

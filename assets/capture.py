@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import dagster as dg
 import pyarrow as pa
 
-from assets import plots, tables
+from assets import calibration_plots, tables
 from assets.calibration import CalibrationError, Solvers, calibrate_file, up_axis
 from assets.calibration_table import from_calibration
 from assets.declare import table_assets
@@ -142,7 +142,7 @@ class _Reader:
             calibration,
             version,
             _stamps(stamps, made[CALIBRATION.name]),
-            {"calibrations": dg.MetadataValue.md(plots.calibrations(calibration, doubtful))},
+            {"calibrations": dg.MetadataValue.md(calibration_plots.session(calibration, doubtful))},
         )
         parts[CLIP.name] = Part(
             session,

@@ -5,7 +5,7 @@ import pyarrow as pa
 
 from assets import licences, tables
 from assets.declare import table_asset
-from assets.graph_path import by_graph, catalogue, direction_of, heard_song, read_clips
+from assets.graph_path import by_graph, catalogue, direction_of, heard_song, poses_of, read_clips
 from assets.hmm_path import by_hmm, load_dancer
 from assets.hmm_tables import to_performances
 from assets.lineage import Part, Progress, Stored, repeatable
@@ -21,7 +21,7 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 @table_asset(
     CHOREOGRAPHY,
     group="dance",
-    code_version="4",
+    code_version="5",
     settings="path match_path hmm_path choreography_model dance.blend_s",
     sources="request",
     partitions=DANCE,
@@ -36,7 +36,7 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
         "music_feature": "graph,matching",
         "motion_feature": "matching",
         "motion_beat": "matching",
-        "canonical_pose": "matching,hmm",
+        "canonical_pose": "graph,matching,hmm",
         "[match_path]": "matching",
         "key_pose": "hmm",
         "performance": "hmm",
@@ -86,7 +86,7 @@ def choreography(
     if base_method(method) == "graph":
         graph, clip_ids = tables.to_motion_graph(motion_graph_node.read(), motion_graph_edge.read())
         clips = read_clips([clip.read(session) for session in clip.keys])
-        known = catalogue(graph, clip_ids, clips, asked.allow)
+        known = catalogue(graph, clip_ids, clips, asked.allow, poses=poses_of(canonical_pose, settings))
         feature, repeat = music_feature.read(song_id), music_repeat.read(song_id)
         danced = by_graph(known, heard_song(grid, duration_s, feature=feature, repeat=repeat), settings, asked)
     elif method == "matching" and asked.wishes:

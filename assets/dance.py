@@ -46,7 +46,7 @@ def load_clips(canonical_pose: Stored, steps: Choreography) -> dict[str, Clip]:
     "assembly",
     (DANCE_POSE, FRAME_LINEAGE),
     group="dance",
-    code_version="2",
+    code_version="3",
     settings="dance",
     sources="request",
     partitions=DANCE,
@@ -86,7 +86,7 @@ def assembly(
 @table_asset(
     DANCE_QUALITY,
     group="dance",
-    code_version="3",
+    code_version="4",
     partitions=DANCE,
     ins={"canonical_pose": _EVERY_CLIP, "clip": _EVERY_CLIP},
     checks={
@@ -123,6 +123,7 @@ def dance_quality(
         "feet": [
             *foot_quality.foot_measures(dance, steps, clips),
             *foot_quality.knee_measures(dance, steps, clips),
+            *foot_quality.slip_measures(dance, steps, clips),
         ],
         "intensity": quality.intensity_measures(dance, strength, grid_s),
         "catalogue": quality.catalogue_measures(_of_sources(steps), _seconds(clip)),

@@ -80,9 +80,15 @@ def table_assets(
     checks: Mapping[str, tuple[Table, str]] | None = None,
     only_for: str = "",
 ) -> Callable[[Callable[..., Any]], dg.AssetsDefinition]:
-    """Declare assets made in one pass, stored in the order of ``tables``; arguments as :func:`table_asset`.
+    """Declare assets made in one pass, stored in the order of ``tables``.
 
-    ``checks`` name the table they are about.
+    Parameters
+    ----------
+    name : of the pass
+    tables : declarations, one an asset
+    group, code_version, settings, sources, partitions, ins, only_for
+        As for :func:`table_asset`.
+    checks : by name, the table a check is about and what it says
     """
     made: Callable[[Callable[..., Any]], dg.AssetsDefinition] = dg.multi_asset(
         name=name,
@@ -128,7 +134,12 @@ def _metadata(
 
 
 def column_schema(table: Table) -> dg.TableSchema:
-    """Columns of a table as Dagster's UI shows them."""
+    """Tell a table's columns as Dagster's UI shows them.
+
+    Parameters
+    ----------
+    table : its declaration
+    """
     columns = []
     for column in table.columns:
         meaning = f"{column.meaning} [{column.unit}]" if column.unit else column.meaning

@@ -66,6 +66,8 @@ class Nodes:
         """Find the nodes that a wish admits, (N,) bool."""
         if wish.clip:
             return np.isin(self.clip_id, wish.clips)
+        if wish.pose:
+            return np.ones(len(self.clip_id), bool)
         if wish.style:
             return np.asarray(self.style == wish.style)
         if wish.not_label:
@@ -75,11 +77,12 @@ class Nodes:
     def instead_of(self, wish: PinWish) -> dict[str, NDArray[np.bool_]]:
         """List what could be wished instead, as one would write it, and the nodes of each.
 
-        Of the same kind: labels for a label or none, styles for a style, clips for a clip; what is spelt alike first,
-        then what there is most of. After clips come labels.
+        Of the same kind: labels for a label or none, styles for a style, clips for a clip or a pose; what is spelt
+        alike first, then what there is most of. After clips come labels.
         """
-        kinds = {"clip:": self.clip_id} if wish.clip else {"style:": self.style} if wish.style else {}
-        wanted = wish.clip or wish.style or wish.label
+        clip = wish.clip or wish.pose_moment[0]
+        kinds = {"clip:": self.clip_id} if clip else {"style:": self.style} if wish.style else {}
+        wanted = clip or wish.style or wish.label
         found: dict[str, NDArray[np.bool_]] = {}
         for prefix, names in {**kinds, "": self.label}.items():
             known, count = np.unique(names[names != ""], return_counts=True)
@@ -102,7 +105,8 @@ def to_pin(wish: PinWish, song: Song, nodes: Nodes) -> Pin:
     Returns
     -------
     Pin
-        Every beat interval that the stretch touches; where the wish names nothing there is, no node is admitted.
+        Every beat interval that the stretch touches; where the wish names nothing there is, no node is admitted. Poses
+        are brought onto nodes by :mod:`assets.pose_pins`.
 
     Raises
     ------
@@ -183,9 +187,11 @@ def sentences(
     names = ", ".join(w.text for w in those)
     reason = {
         "nothing": f"what is {_called(those[0])} may not be danced: its licence is not among those of 'allow'"
-        if nodes.wished(those[0]).any()
+        if nodes.wished(those[0]).any() and not those[0].pose
         else f"no clip with {parts.many} is {_called(those[0])}{_near(those[0], nodes)}",
-        "tempo": f"what it wishes has no {parts.many} near enough to the song's tempo there (warp 0.80 to 1.25)",
+        "tempo": f"what it wishes has no {parts.many} near enough to the song's tempo there (warp 0.80 to 1.25)"
+        if not those[0].pose
+        else "no clip shows a pose near enough to it at the song's tempo there (warp 0.80 to 1.25)",
         "start": f"no {parts.way} leads there in time, or from there to the end of the song",
         "same_time": "each of them can be kept, but no clip is all of this at the same time",
         "path": f"each of them can be kept, but no {parts.way} keeps them all"
@@ -221,15 +227,17 @@ def way_out(way: WayOut, pins: Sequence[Pin], wishes: Sequence[PinWish], song: S
 
 
 def _called(wish: PinWish) -> str:
-    kind = "clip" if wish.clip else "style" if wish.style else "label"
-    return {"clip": f"called {wish.clip!r}", "style": f"of style {wish.style!r}"}.get(
+    clip = wish.clip or wish.pose_moment[0]
+    kind = "clip" if clip else "style" if wish.style else "label"
+    return {"clip": f"called {clip!r}", "style": f"of style {wish.style!r}"}.get(
         kind, f"labelled {wish.label!r}" if wish.label else f"labelled other than {wish.not_label!r}"
     )
 
 
 def _near(wish: PinWish, nodes: Nodes) -> str:
-    wanted = wish.clip or wish.style or wish.label or wish.not_label
-    known = np.unique(nodes.clip_id if wish.clip else nodes.style if wish.style else nodes.label).tolist()
+    clip = wish.clip or wish.pose_moment[0]
+    wanted = clip or wish.style or wish.label or wish.not_label
+    known = np.unique(nodes.clip_id if clip else nodes.style if wish.style else nodes.label).tolist()
     near = difflib.get_close_matches(wanted, known, n=3, cutoff=0.4) or known[:8]
     return f"; there are {', '.join(near)}" if near else ""
 

@@ -14,16 +14,20 @@ from assets import direction, licences, matching_tables, plots
 from assets.danced import Danced
 from assets.direction import GRAPH_PARTS, DirectionError, Nodes, Parts
 from assets.direction import Song as SongBeats
+from assets.lineage import Stored
 from assets.partitions import alternative_number
+from assets.pose_pins import Poses, to_pose_pins
 from assets.sources import Studio, brief_of, request_of
 from kernels.assembly.timing import blend_widths, cover, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
-from kernels.graph.costs import PathCosts, intensity_price
-from kernels.graph.path import InfeasiblePathError, Path, find_path, to_choreography
-from kernels.graph.pins import Conflict, Pin, Reach, admitted, find_conflict
+from kernels.graph.costs import PathCosts, intensity_price, weight_scale
+from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, to_choreography
+from kernels.graph.pins import Conflict, Pin, Reach, admitted, find_conflict, step_price
+from kernels.graph.program import StepPrice
 from kernels.graph.structure import structure_pins
+from kernels.graph.transitions import THRESHOLD
 from kernels.types import BeatGrid, Choreography, Float, Int, MotionGraph
-from schemas.keys import source_clip
+from schemas.keys import seen_label, source_clip
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
 
@@ -73,15 +77,26 @@ def direction_of(studio: Studio, key: str) -> Direction:
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:
-    """The motion graph as a director may use it: clips by index, and what is known of the clip of each node."""
+    """The motion graph as a director may use it: clips by index, and what is known of the clip of each node.
+
+    ``poses`` are what pins of a pose need; None where there are no such pins.
+    """
 
     graph: MotionGraph
     clip_ids: tuple[str, ...]
     nodes: Nodes
     is_allowed: NDArray[np.bool_]
+    poses: Poses | None = None
 
 
-def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame, allow: Sequence[str]) -> Catalogue:
+def catalogue(
+    graph: MotionGraph,
+    clip_ids: tuple[str, ...],
+    clips: pl.DataFrame,
+    allow: Sequence[str],
+    *,
+    poses: Poses | None = None,
+) -> Catalogue:
     """Join the graph with what is known of its clips, and take out what licences forbid.
 
     Parameters
@@ -90,6 +105,7 @@ def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame
     clip_ids : by clip index
     clips : rows of the table ``clip``
     allow : see :class:`Direction`
+    poses : see :class:`Catalogue`
 
     Returns
     -------
@@ -98,6 +114,7 @@ def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame
     """
     known = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
     facts = [known[source_clip(clip)] for clip in clip_ids]
+    facts = [row | {"label": seen_label(str(row["label"]), clip)} for row, clip in zip(facts, clip_ids, strict=True)]
     of_node = graph.clip_index
     licence = [str(row["licence"]) for row in facts]
     is_whole = np.array([licences.terms_of(name).no_derivatives for name in licence] or [False])[of_node]
@@ -105,7 +122,14 @@ def catalogue(graph: MotionGraph, clip_ids: tuple[str, ...], clips: pl.DataFrame
     nodes = Nodes(*(np.array([str(row[c]) for row in facts] or [""])[of_node] for c in ("clip_id", "label", "style")))
     is_allowed = np.array([licences.is_allowed(name, allow) for name in licence] or [True])[of_node]
     free_graph = replace(graph, source=graph.source[free], target=graph.target[free], weight=graph.weight[free])
-    return Catalogue(free_graph, clip_ids, nodes, is_allowed)
+    return Catalogue(free_graph, clip_ids, nodes, is_allowed, poses)
+
+
+def poses_of(canonical_pose: Stored, settings: Settings) -> Poses:
+    """Make ready what pins of a pose need; poses are as near as the graph's own threshold says of positions."""
+    graph = settings.motion_graph
+    threshold = graph.threshold if graph.metric == "position" and graph.threshold else THRESHOLD
+    return Poses(canonical_pose, threshold)
 
 
 def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direction) -> Danced:
@@ -117,18 +141,12 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
         If no dance can be had, or not with these pins; its metadata hold the conflict and the ways out.
     """
     graph = known.graph
-    pins = pins_of(known.nodes, song, asked)
-    mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
+    costs = path_costs(settings.path)
+    pins = pins_of(known, song, asked, costs)
     if not known.is_allowed.any() and len(known.is_allowed):
         raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
-    costs = path_costs(settings.path)
     strength = strength_price(known, song, settings.path)
-    interval_price = strength
-    if pins and asked.is_soft:
-        interval_price = strength + np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH)
-    elif pins:
-        refuse_conflict(known, song, pins, asked, costs)
-        mask = mask & admitted(pins, *mask.shape)
+    terms = terms_of(known, song, pins, asked, costs, strength)
 
     def find(price: Float, mask: NDArray[np.bool_]) -> Path:
         return search(
@@ -137,24 +155,24 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
             costs,
             admissible=None if mask.all() else np.ascontiguousarray(mask),
             stretch_price=price if price.any() else None,
-            interval_price=interval_price if interval_price.any() else None,
+            interval_price=terms.interval_price if terms.interval_price.any() else None,
+            step_price=terms.step_price,
         )
 
-    found = find_alternatives(graph, asked.alternative, find=lambda price: find(price, mask))
+    found = find_alternatives(graph, asked.alternative, find=lambda price: find(price, terms.admissible))
     n_repeated = 0
     if settings.path.repeat == "structure" and song.repeats:
-        reach = Reach(
-            graph, song.grid_s, costs=costs, starts=np.flatnonzero(known.is_allowed), allowed=known.is_allowed
+        own, n_repeated = structure_pins(
+            found[-1], song.repeats, reach_of(known, song, costs), kept=[] if asked.is_soft else pins
         )
-        own, n_repeated = structure_pins(found[-1], song.repeats, reach, kept=[] if asked.is_soft else pins)
-        again = mask & admitted(own, *mask.shape)
+        again = terms.admissible & admitted(own, *terms.admissible.shape)
         price = shown_price(graph, found[:-1], diversity=1.0)
         found = [*found[:-1], find(price, again)] if own else found
     path = found[-1]
     steps, kept = chosen_steps(path, graph, song.grid_s, known.clip_ids, song.duration_s, settings.dance)
     spans = zip(path.beat_index.tolist(), path.beat_span.tolist(), path.source_node.tolist(), strict=True)
     intensity = np.array([strength[k : k + d, u].sum() for k, d, u in spans])
-    columns = ("transition", "warp", "stride", "beat", "repetition", "diversity")
+    columns = ("transition", "stay", "warp", "stride", "beat", "repetition", "diversity")
     every = {name: getattr(path, f"{name}_cost") for name in columns}
     every |= {"intensity": intensity, "wish": np.maximum(path.wish_cost - intensity, 0.0)}
     return Danced(
@@ -173,6 +191,45 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
         },
         [pin_of_step(pins, int(k), int(d)) for k, d in zip(path.beat_index[kept], path.beat_span[kept], strict=True)],
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """What is wished of a dance, for the search: (K, N) admitted, (K, N) priced, and prices of single steps."""
+
+    admissible: NDArray[np.bool_]
+    interval_price: Float
+    step_price: StepPrice
+
+
+def terms_of(
+    known: Catalogue, song: SongBeats, pins: Sequence[Pin], asked: Direction, costs: PathCosts, strength: Float
+) -> Terms:
+    """Gather what a search is to keep and to pay; dg.Failure where pins conflict."""
+    mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
+    if not asked.is_soft:
+        if pins:
+            refuse_conflict(known, song, pins, asked, costs)
+            mask = mask & admitted(pins, *mask.shape)
+        return Terms(mask, strength, step_price(pins))
+    soft = [replace(pin, steps=_softened(pin)) for pin in pins]
+    price = strength + np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH) if pins else strength
+    return Terms(mask, price, step_price(soft))
+
+
+def _softened(pin: Pin) -> StepPrice:
+    """Price a wish for a pose: that of a beat where it is not kept, less where a pose near to it is shown."""
+    return {
+        (beat, kind): np.minimum(price, SOFT_WISH)
+        for (beat, kind), price in pin.steps.items()
+        if beat + STEPS[kind][1] > pin.first
+    }
+
+
+def reach_of(known: Catalogue, song: SongBeats, costs: PathCosts) -> Reach:
+    """Make ready the question whether pins can be kept in a song."""
+    starts = np.flatnonzero(known.is_allowed)
+    return Reach(known.graph, song.grid_s, costs=costs, starts=starts, allowed=known.is_allowed)
 
 
 def strength_price(known: Catalogue, song: SongBeats, settings: PathSettings) -> Float:
@@ -201,22 +258,32 @@ def heard_song(
     return SongBeats(grid_s, beats, duration_s, intensity, repeats)
 
 
-def pins_of(nodes: Nodes, song: SongBeats, asked: Direction) -> list[Pin]:
+def pins_of(known: Catalogue, song: SongBeats, asked: Direction, costs: PathCosts) -> list[Pin]:
     """Bring what is wished onto beats and nodes; dg.Failure where a pin names no place of the song."""
     try:
-        return [direction.to_pin(wish, song, nodes) for wish in asked.wishes]
+        posed: dict[str, Pin] = {}
+        if any(wish.pose for wish in asked.wishes):
+            if known.poses is None:
+                raise ValueError("poses: want those of the clips where a pin wishes for one, got none")
+            weight = costs.transition / weight_scale(known.graph, costs)
+            posed = to_pose_pins(asked.wishes, song, known.graph, known.clip_ids, known.poses, weight=weight)
+        return [posed.get(wish.text) or direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:
-        facts = {
-            "conflict": dg.MetadataValue.json([str(error).partition(": ")[0]]),
-            "ways_out": dg.MetadataValue.json([]),
-        }
-        raise dg.Failure(str(error), metadata=facts, allow_retries=False) from error
+        raise place_failure(error) from error
+
+
+def place_failure(error: DirectionError) -> dg.Failure:
+    """Say that a pin names no place of the song, for a person and for a machine."""
+    facts: dict[str, Any] = {
+        "conflict": dg.MetadataValue.json([str(error).partition(": ")[0]]),
+        "ways_out": dg.MetadataValue.json([]),
+    }
+    return dg.Failure(str(error), metadata=facts, allow_retries=False)
 
 
 def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], asked: Direction, costs: PathCosts) -> None:
     """Raise dg.Failure where pins cannot be kept, naming the fewest of them that cannot and what would help."""
-    starts = np.flatnonzero(known.is_allowed)
-    reach = Reach(known.graph, song.grid_s, costs=costs, starts=starts, allowed=known.is_allowed)
+    reach = reach_of(known, song, costs)
     usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
     if not reach.is_danceable:
         return  # the search says why there is no dance at all
@@ -227,7 +294,12 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
 
 
 def conflict_failure(
-    conflict: Conflict, pins: Sequence[Pin], asked: Direction, song: SongBeats, nodes: Nodes, parts: Parts = GRAPH_PARTS
+    conflict: Conflict,
+    pins: Sequence[Pin],
+    asked: Direction,
+    song: SongBeats,
+    nodes: Nodes,
+    parts: Parts = GRAPH_PARTS,
 ) -> dg.Failure:
     """Say which pins cannot be kept and what would help, for a person and, in the metadata, for a machine."""
     told = direction.sentences(conflict, pins, asked.wishes, song, nodes, parts)
@@ -249,12 +321,19 @@ def kept_pins(pins: Sequence[Pin], song: SongBeats, path: Path, known: Catalogue
     """Facts of each pin for machines: whether it is kept, from when to when, by which clips."""
     clip: dict[int, str] = {}
     node: dict[int, int] = {}
-    for k, d, u in zip(path.beat_index.tolist(), path.beat_span.tolist(), path.source_node.tolist(), strict=True):
+    missed: set[str] = set()
+    for k, d, m, u in zip(
+        *(column.tolist() for column in (path.beat_index, path.beat_span, path.motion_span, path.source_node)),
+        strict=True,
+    ):
+        step = (k, STEPS.index((m, d)))
+        missed |= {pin.name for pin in pins if step in pin.steps and not np.isfinite(pin.steps[step][u])}
         for interval in range(k, k + d):
             clip[interval], node[interval] = source_clip(known.clip_ids[known.graph.clip_index[u]]), u
     facts = direction.kept(pins, song, clip)
     for pin, fact in zip(pins, facts, strict=True):
-        fact["is_kept"] = bool(all(pin.nodes[node[k]] for k in range(pin.first, pin.last)))
+        is_admitted = all(pin.nodes[node[k]] for k in range(pin.first, pin.last))
+        fact["is_kept"] = bool(is_admitted and pin.name not in missed)
     return facts
 
 
@@ -267,6 +346,8 @@ def path_costs(settings: PathSettings) -> PathCosts:
         warp=usual.warp * settings.warp_weight,
         usage=usual.usage * settings.repetition_weight,
         seam=settings.seam_cost,
+        stay=settings.stay_cost,
+        stay_beats=settings.stay_beats,
         missed_beat=usual.missed_beat * settings.beat_weight,
         jump_back=usual.jump_back * settings.repetition_weight,
     )

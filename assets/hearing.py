@@ -31,14 +31,35 @@ class Heard:
         return (spread_bands(self.drums) if self.is_banded else self.drums), self.melody
 
     def log_likelihood(self, model: Model) -> Float:
-        """Log likelihood of each interval in each state, (K, N); of a band all its drums together."""
+        """Log likelihood of each interval in each state, (K, N); of a band all its drums together.
+
+        Parameters
+        ----------
+        model : Model of N states, with these streams
+
+        Returns
+        -------
+        (K, N) float64, natural logarithm; 0 where nothing sounds
+        """
         drums, melody = model.log_emission
         log_p: Float = model.weight[0] * (self.drums @ (banded(drums) if self.is_banded else drums).T)
         return log_p + model.weight[1] * (self.melody @ melody.T)
 
 
 def hear(percussion: pa.Table, melody: pa.Table, edge_s: Float, *, symbols: str) -> Heard:
-    """Count what sounds between edges, (K + 1,) seconds of the song; ``symbols`` as the setting says."""
+    """Count what sounds between edges.
+
+    Parameters
+    ----------
+    percussion, melody : tables of these names, the rows of one song
+    edge_s : (K + 1,) float, seconds of the song, rising
+    symbols : setting ``choreography_model.symbols``
+
+    Returns
+    -------
+    Heard
+        In K intervals; zeros where nothing sounds.
+    """
     hits, is_banded = hmm_tables.to_percussion(percussion)
     if symbols == "single":
         drums = loudest_in(hits, edge_s, ahead_s=AHEAD_S)

@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 
-from assets.direction import Nodes, Parts, Song
-from assets.graph_path import SOFT_WISH, Direction, conflict_failure, pins_of
+import dagster as dg
+
+from assets import direction
+from assets.direction import DirectionError, Nodes, Parts, Song
+from assets.graph_path import SOFT_WISH, Direction, conflict_failure, place_failure
 from kernels.graph.pins import Pin, find_conflict
 from kernels.hmm.pins import SpanReach
 
@@ -27,9 +30,21 @@ def kept_or_refused(reach: SpanReach, nodes: Nodes, song: Song, asked: Direction
     Raises
     ------
     dg.Failure
-        Where a pin names no place of the song, or pins conflict; its metadata hold the conflict and the ways out.
+        Where a pin names no place of the song or a pose, or pins conflict; its metadata hold the conflict and the ways
+        out.
     """
-    pins = pins_of(nodes, song, asked)
+    posed = [wish.text for wish in asked.wishes if wish.pose]
+    if posed:
+        raise dg.Failure(
+            f"{', '.join(posed)}: poses are pinned by the graph method alone; pin a clip, label or style, or dance it "
+            "with --method graph",
+            metadata={"conflict": dg.MetadataValue.json(posed), "ways_out": dg.MetadataValue.json([])},
+            allow_retries=False,
+        )
+    try:
+        pins = [direction.to_pin(wish, song, nodes) for wish in asked.wishes]
+    except DirectionError as error:
+        raise place_failure(error) from error
     conflict = None
     if pins and not asked.is_soft:
         conflict = find_conflict(reach, pins, choices=[nodes.instead_of(wish) for wish in asked.wishes])

@@ -210,6 +210,12 @@ def free_to_join(licence_of: Mapping[str, str], allow: Iterable[str]) -> set[str
 
 
 def is_allowed(licence: str, allow: Iterable[str]) -> bool:
-    """Whether a clip of this licence may be danced where only some are allowed; all are where none is named."""
+    """Whether a clip of this licence may be danced where only some are allowed; all are where none is named.
+
+    Parameters
+    ----------
+    licence : its name, in any case; "" counts as ``studio``
+    allow : names in any case, compared whole: expressions are not taken apart
+    """
     names = {name.strip().lower() for name in allow}
     return not names or (licence.strip() or STUDIO).lower() in names

@@ -101,11 +101,27 @@ class Stored(Protocol):
         ...
 
     def read(self, key: str = "", *, clip_ids: Iterable[str] | None = None) -> pa.Table:
-        """Read one partition, or only some clips of it."""
+        """Read one partition, or only some clips of it.
+
+        Parameters
+        ----------
+        key : one of :attr:`keys`; "" for an asset without partitions
+        clip_ids : of the rows to read; None for all. Clips that are not there have no rows.
+
+        Returns
+        -------
+        pyarrow.Table
+            As declared, in the stored order.
+        """
         ...
 
     def stamp(self, key: str = "") -> Stamp:
-        """Read what the partition was made from and is."""
+        """Read what the partition was made from and is.
+
+        Parameters
+        ----------
+        key : as for :meth:`read`
+        """
         ...
 
 
@@ -113,11 +129,32 @@ class Earlier(Protocol):
     """What the lake held before this run."""
 
     def table(self, asset: str, key: str) -> pa.Table | None:
-        """Rows stored earlier; None when there are none or they have another shape."""
+        """Read the rows stored earlier.
+
+        Parameters
+        ----------
+        asset : name of a table
+        key : partition; "" for an asset without partitions
+
+        Returns
+        -------
+        pyarrow.Table or None
+            None where there are none or they have another shape.
+        """
         ...
 
     def stamp(self, asset: str, key: str) -> Stamp | None:
-        """Stamp stored earlier; None when there is none."""
+        """Read the stamp stored earlier.
+
+        Parameters
+        ----------
+        asset, key : as for :meth:`table`
+
+        Returns
+        -------
+        Stamp or None
+            None where there is none.
+        """
         ...
 
 
@@ -125,7 +162,14 @@ class Progress(Protocol):
     """Told how far a long step is."""
 
     def begin(self, what: str, total: int) -> None:
-        """Start counting."""
+        """Start counting.
+
+        Parameters
+        ----------
+        what : what is done, as a person reads it
+        total : int, >= 0
+            How many steps it takes.
+        """
         ...
 
     def step(self) -> None:
@@ -134,9 +178,19 @@ class Progress(Protocol):
 
 
 def content_version(table: pa.Table) -> str:
-    """Hash of a table's rows and types, metadata left out: 16 hexadecimal characters.
+    """Hash a table's rows and types, metadata left out.
 
     Rows made now and the same rows read and sliced are laid out differently in memory: taken row by row they are not.
+
+    Parameters
+    ----------
+    table : pyarrow.Table
+        Its order of rows counts.
+
+    Returns
+    -------
+    str
+        16 hexadecimal characters, also for no rows.
     """
     digest = hashlib.sha256()
     for name, column in zip(table.column_names, table.columns, strict=True):
@@ -166,7 +220,18 @@ def _hash_values(digest: Any, values: pa.Array) -> None:  # noqa: ANN401 - hashl
 
 
 def version_of(*parts: str) -> str:
-    """Hash of versions in order."""
+    """Hash versions in order.
+
+    Parameters
+    ----------
+    parts : str
+        Without line breaks.
+
+    Returns
+    -------
+    str
+        16 hexadecimal characters.
+    """
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
@@ -180,7 +245,23 @@ def repeatable() -> AbstractContextManager[object]:
 
 
 def code_version(context: dg.AssetExecutionContext, asset: str) -> str:
-    """Code version of an asset of this run."""
+    """Read the code version of an asset of this run.
+
+    Parameters
+    ----------
+    context : of the step
+    asset : name of one of the assets it makes
+
+    Returns
+    -------
+    str
+        Empty where the asset declares none.
+
+    Raises
+    ------
+    KeyError
+        If the step makes no such asset.
+    """
     return context.assets_def.code_versions_by_key[dg.AssetKey(asset)] or ""
 
 
@@ -236,5 +317,17 @@ def _joined(table: Table, parts: Sequence[pa.Table]) -> pa.Table:
 
 
 def clip_versions(stored: Stored, key: str, *also: str) -> dict[str, str]:
-    """Version of what each clip's rows are made from: its content upstream, and ``also`` (code, settings)."""
+    """Version what each clip's rows are made from: its content upstream, and ``also``.
+
+    Parameters
+    ----------
+    stored : the upstream asset
+    key : session
+    also : versions of code and settings
+
+    Returns
+    -------
+    dict
+        Version by clip, in the stored order; {} for a session of no clips.
+    """
     return {clip: version_of(stamp.content, *also) for clip, stamp in stored.stamp(key).clips.items()}

@@ -173,7 +173,17 @@ def key_pose(
 
 
 def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
-    """Features of one clip's canonical poses."""
+    """Measure the features of one clip.
+
+    Parameters
+    ----------
+    rows : table ``canonical_pose``, the rows of one clip, at least one
+    settings : the ``[feature]`` section
+
+    Returns
+    -------
+    table ``motion_feature``, a row a value at 120 Hz
+    """
     moved = tables.to_canonical_pose(rows)
     found = motion_features(
         moved.position_xyz_m,
@@ -190,7 +200,17 @@ def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
 
 
 def beat_settings(settings: MotionBeatSettings) -> BeatSettings:
-    """Turn the names of ``odori.toml`` into what the kernel takes; ValueError for a joint that is none."""
+    """Turn the names of ``odori.toml`` into what the kernel takes.
+
+    Parameters
+    ----------
+    settings : the ``[motion_beat]`` section
+
+    Raises
+    ------
+    ValueError
+        If a joint is none of the canonical skeleton.
+    """
     joints = tuple(CANONICAL.index(name) for name in settings.joints)
     return BeatSettings(settings.component, joints, settings.method, settings.extrema_per_beat)  # type: ignore[arg-type]
 

@@ -26,7 +26,18 @@ class Cut:
 
 
 def cut(rows: pa.Table, settings: BasicMotionSettings) -> Cut:
-    """Cut one clip into motions; frames that no body moves to, at its ends, are left out."""
+    """Cut one clip into motions; frames that no body moves to, at its ends, are left out.
+
+    Parameters
+    ----------
+    rows : table ``canonical_pose``, the rows of one clip, at least one
+    settings : the ``[basic_motion]`` section
+
+    Returns
+    -------
+    Cut
+        Without motions where the clip has no key poses.
+    """
     moved = tables.to_canonical_pose(rows)
     first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
     used = slice(first, last + 1)

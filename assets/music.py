@@ -76,6 +76,16 @@ class Heard:
 def listen(song: Song, studio: Studio, settings: Settings) -> Heard:
     """Read a song and find its beats, as its brief wants them.
 
+    Parameters
+    ----------
+    song : Song
+    studio : Studio
+    settings : its settings
+
+    Returns
+    -------
+    Heard
+
     Raises
     ------
     FormatError

@@ -16,7 +16,13 @@ EVERY = dg.AllPartitionMapping()
 
 
 def dance_key(song: str, method: str) -> str:
-    """Partition key of a song danced with a method."""
+    """Partition key of a song danced with a method.
+
+    Parameters
+    ----------
+    song : key
+    method : of :data:`METHOD`
+    """
     return str(dg.MultiPartitionKey({"song": song, "method": method}))
 
 

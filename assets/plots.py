@@ -15,7 +15,6 @@ import numpy as np
 import pyarrow as pa
 
 from assets import tables
-from assets.calibration_table import to_curves
 from kernels.assembly.blend import Dance
 from kernels.assembly.quality import Measure
 from kernels.motion.velocity import kinematic_beats, mean_speed
@@ -24,12 +23,24 @@ from kernels.types import BeatGrid, Choreography, Float
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_INK, _SOFT, _WARM, _COOL = "#222222", "#999999", "#c8501e", "#1e64c8"
+INK, SOFT, WARM, COOL = "#222222", "#999999", "#c8501e", "#1e64c8"
 _LONGEST_LIST = 60
 
 
 def markdown(headers: Sequence[str], rows: Sequence[Sequence[object]], *, longest: int = _LONGEST_LIST) -> str:
-    """Write rows as a Markdown table, cut after ``longest`` rows with a word on how many more there are."""
+    """Write rows as a Markdown table, cut after ``longest`` rows with a word on how many more there are.
+
+    Parameters
+    ----------
+    headers : C texts
+    rows : of C values each, any values; numbers with a fraction get three digits, None an empty cell
+    longest : int, >= 0
+
+    Returns
+    -------
+    str
+        The headers alone where there are no rows.
+    """
     lines = [f"| {' | '.join(headers)} |", f"|{'---|' * len(headers)}"]
     lines += [f"| {' | '.join(_cell(value) for value in row)} |" for row in rows[:longest]]
     if len(rows) > longest:
@@ -42,14 +53,30 @@ def _cell(value: object) -> str:
     return text.replace("|", "\\|").replace("\n", " ")
 
 
-def _figure(width_in: float, height_in: float) -> Figure:
+def figure_of(width_in: float, height_in: float) -> Figure:
+    """Begin a picture.
+
+    Parameters
+    ----------
+    width_in, height_in : float, inches of 80 pixels, > 0
+    """
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width_in, height_in), dpi=80, layout="constrained")
 
 
 def png(figure: Figure) -> bytes:
-    """Draw a figure as PNG without a date in it."""
+    """Draw a figure as PNG without a date in it.
+
+    Parameters
+    ----------
+    figure : matplotlib's Figure
+
+    Returns
+    -------
+    bytes
+        Equal for equal figures.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     sink = io.BytesIO()
@@ -58,23 +85,46 @@ def png(figure: Figure) -> bytes:
 
 
 def picture(data: bytes, title: str) -> str:
-    """Put a PNG into Markdown."""
+    """Put a PNG into Markdown.
+
+    Parameters
+    ----------
+    data : bytes of the PNG
+    title : shown where pictures are not; no ``]`` in it
+
+    Returns
+    -------
+    str
+        One line, with the picture inside.
+    """
     return f"![{title}](data:image/png;base64,{base64.b64encode(data).decode()})"
 
 
-def _plain(axes: Any) -> None:  # noqa: ANN401 - matplotlib has no public type stubs here
+def plain(axes: Any) -> None:  # noqa: ANN401 - matplotlib has no public type stubs here
+    """Take the frame off a plot, and make its labels small.
+
+    Parameters
+    ----------
+    axes : matplotlib's Axes, changed in place
+    """
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    axes.tick_params(labelsize=8, colors=_INK)
-
-
-# What the plots of other areas draw with.
-INK, SOFT, WARM, COOL = _INK, _SOFT, _WARM, _COOL
-figure_of, plain = _figure, _plain
+    axes.tick_params(labelsize=8, colors=INK)
 
 
 def session_beats(beats: pa.Table, clips: pa.Table) -> str:
-    """Show a session: its clips with label, rate, length and beats, and a raster of the beats."""
+    """Show a session: its clips with label, rate, length and beats, and a raster of the beats.
+
+    Parameters
+    ----------
+    beats : table ``motion_beat``
+    clips : table ``clip`` of the same session; refused ones show their reason
+
+    Returns
+    -------
+    str
+        Markdown; the table without a picture where no clip was read. The first 60 clips are shown.
+    """
     by_clip = tables.by_clip(beats)
     rows, marks = [], []
     for clip in clips.to_pylist():
@@ -100,152 +150,108 @@ def session_beats(beats: pa.Table, clips: pa.Table) -> str:
     if not marks:
         return table
     shown = marks[:_LONGEST_LIST]
-    figure = _figure(9, 0.7 + 0.16 * len(shown))
+    figure = figure_of(9, 0.7 + 0.16 * len(shown))
     axes = figure.add_subplot()
     for i, (_, duration_s, time_s) in enumerate(shown):
-        axes.plot([0, duration_s], [i, i], color=_SOFT, linewidth=0.8)
-        axes.plot(time_s, np.full(len(time_s), i), "|", color=_WARM, markersize=6)
+        axes.plot([0, duration_s], [i, i], color=SOFT, linewidth=0.8)
+        axes.plot(time_s, np.full(len(time_s), i), "|", color=WARM, markersize=6)
     axes.set_yticks(range(len(shown)), [name.rsplit("-", 1)[-1] for name, _, _ in shown], fontsize=6)
     axes.set_ylim(len(shown) - 0.4, -0.6)
     axes.set_xlabel("seconds of the clip, beats marked", fontsize=8)
-    _plain(axes)
+    plain(axes)
     return f"{picture(png(figure), 'motion beats')}\n\n{table}"
 
 
-_CONFIDENCE = {"high": "#3c8c50", "medium": "#c8a01e", "low": _WARM, "axis-unobserved": "#8c3c96", "none": _INK}
-_MOST_PICTURES = 6
-
-
-def calibrations(rows: pa.Table, doubtful: Sequence[str]) -> str:
-    """Show the calibrations of a session: residuals over time, gaps before and after, bones, advice, warnings."""
-    by_clip = tables.by_clip(rows)
-    if not by_clip and not doubtful:
-        return "no suit recordings"
-    parts = [f"- {line}" for line in doubtful[:_LONGEST_LIST]]
-    for clip_id, joints in list(by_clip.items())[:_MOST_PICTURES]:
-        parts += ["", f"### {clip_id}", "", picture(calibration(joints), clip_id), "", calibration_table(joints)]
-    if len(by_clip) > _MOST_PICTURES:
-        parts += ["", f"… and {len(by_clip) - _MOST_PICTURES} more recordings; their rows are in the table"]
-    return "\n".join(parts)
-
-
-def calibration_table(joints: pa.Table) -> str:
-    """List the joints of one calibration with their lengths, how sure they are, and what the performer can do."""
-    rows = [
-        (
-            joint["joint_name"],
-            joint["parent_name"],
-            f"{1000 * joint['length_m']:.1f}",
-            joint["confidence_label"],
-            joint["rank"],
-            f"{np.degrees(joint['range_of_motion_rad'][-1]):.1f}",
-            f"{1000 * joint['residual_rms_m']:.1f}",
-            f"{100 * joint['filled_ratio']:.1f}",
-            joint["advice"],
-        )
-        for joint in joints.to_pylist()
-    ]
-    head = ("joint", "on", "bone, mm", "confidence", "rank", "least motion, deg", "residual, mm", "filled, %", "advice")
-    return markdown(head, rows)
-
-
-def calibration(joints: pa.Table) -> bytes:
-    """Draw one calibration as PNG: residual of each joint over time, gaps before and after, bones by confidence."""
-    from matplotlib.patches import Patch
-
-    names = joints["joint_name"].to_pylist()
-    before, after = (to_curves(joints[f"gap_{when}_curve_m"]) for when in ("before", "after"))
-    figure = _figure(12, 6.5)
-    halves: Any = figure.subfigures(1, 2, width_ratios=(1.7, 1))
-    left, right = halves
-    heat, gap = left.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-    most_mm = max(float(np.percentile(1000 * before, 99)) if before.size else 0.0, 1.0)
-    span_s = joints["span_s"][0].as_py()
-    extent = (0.0, span_s * max(before.shape[1], 1), len(names) - 0.5, -0.5)
-    image = heat.imshow(1000 * before, aspect="auto", cmap="magma_r", vmin=0, vmax=most_mm, extent=extent)
-    heat.set_yticks(range(len(names)), names, fontsize=7)
-    heat.set_title("residual: where the two sensors of a joint have it, mm apart", fontsize=8, loc="left")
-    figure.colorbar(image, ax=heat, pad=0.01).ax.tick_params(labelsize=7)
-    time_s = span_s * (np.arange(before.shape[1]) + 0.5)
-    for curve, colour, word in ((before, _WARM, "before"), (after, _COOL, "after")):
-        size_mm = np.maximum(1000 * np.sqrt(np.mean(curve**2, axis=0)), 1e-13)
-        gap.semilogy(time_s, size_mm, color=colour, linewidth=1, label=word)
-    gap.set_title("gap at the joints, mm, root mean square of all", fontsize=8, loc="left")
-    gap.set_xlabel("seconds of the recording", fontsize=8)
-    gap.legend(fontsize=7, frameon=False, loc="center right")
-    bones = right.add_subplot()
-    words = joints["confidence_label"].to_pylist()
-    length_mm = 1000 * tables.to_numbers(joints["length_m"])
-    bones.barh(range(len(names)), length_mm, color=[_CONFIDENCE[word] for word in words])
-    for k, value in enumerate(length_mm):
-        bones.text(value, k, f" {value:.0f}", fontsize=7, va="center")
-    bones.set_yticks(range(len(names)), names, fontsize=7)
-    bones.set_ylim(len(names) - 0.4, -0.6)
-    bones.set_title("bone to the joint, mm, by confidence", fontsize=8, loc="left")
-    bones.legend(
-        handles=[Patch(color=_CONFIDENCE[word], label=word) for word in _CONFIDENCE if word in words],
-        fontsize=7,
-        frameon=False,
-        ncols=len(_CONFIDENCE),
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.04),
-    )
-    for axes in (heat, gap, bones):
-        _plain(axes)
-    return png(figure)
-
-
 def song_beats(grid: BeatGrid, time_s: Float, loudness_db: Float) -> str:
-    """Show a song: loudness, beats and downbeats, and the tempo over time."""
-    figure = _figure(11, 4)
+    """Show a song: loudness, beats and downbeats, and the tempo over time.
+
+    Parameters
+    ----------
+    grid : BeatGrid
+    time_s : (F,) float, seconds
+    loudness_db : (F,) float, dB(A)
+
+    Returns
+    -------
+    str
+        Markdown; empty axes where there is neither sound nor beat.
+    """
+    figure = figure_of(11, 4)
     level, tempo = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    level.plot(time_s, loudness_db, color=_INK, linewidth=0.8)
+    level.plot(time_s, loudness_db, color=INK, linewidth=0.8)
     level.set_ylabel("level, dB(A)", fontsize=8)
     low, high = (float(np.percentile(loudness_db, q)) for q in (5, 100)) if len(time_s) else (-60.0, 0.0)
     level.set_ylim(low - 6, high + 3)
     is_downbeat = grid.beat_in_bar_number == 1
-    level.vlines(grid.time_s, low - 6, low - 1, color=_COOL, linewidth=0.7)
-    level.vlines(grid.time_s[is_downbeat], low - 6, low + 4, color=_WARM, linewidth=1.1)
+    level.vlines(grid.time_s, low - 6, low - 1, color=COOL, linewidth=0.7)
+    level.vlines(grid.time_s[is_downbeat], low - 6, low + 4, color=WARM, linewidth=1.1)
     if len(grid.time_s) > 1:
-        tempo.plot(grid.time_s[1:], 60 / np.diff(grid.time_s), color=_COOL, linewidth=1)
+        tempo.plot(grid.time_s[1:], 60 / np.diff(grid.time_s), color=COOL, linewidth=1)
     tempo.set_ylabel("beats a minute", fontsize=8)
     tempo.set_xlabel("seconds; beats blue, downbeats red", fontsize=8)
     for axes in (level, tempo):
-        _plain(axes)
+        plain(axes)
     return picture(png(figure), "beats of the song")
 
 
 def motion_graph(weight: Float, threshold: float, degree: Float) -> str:
-    """Show a motion graph: how close its transitions are, and how many each beat has."""
-    figure = _figure(9, 2.6)
+    """Show a motion graph: how close its transitions are, and how many each beat has.
+
+    Parameters
+    ----------
+    weight : (E,) float, >= 0
+        How far apart the beats of each transition are, no unit: see :mod:`kernels.graph.transitions`.
+    threshold : float
+        Up to which they are kept.
+    degree : (N,) float
+        Transitions from each beat.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
+    figure = figure_of(9, 2.6)
     left, right = figure.subplots(1, 2)
-    left.hist(weight, bins=40, color=_COOL)
-    left.axvline(threshold, color=_WARM, linewidth=1)
+    left.hist(weight, bins=40, color=COOL)
+    left.axvline(threshold, color=WARM, linewidth=1)
     left.set_xlabel("d(i,j) / (d(i) + d(j)), threshold red", fontsize=8)
     left.set_ylabel("transitions", fontsize=8)
-    right.hist(np.minimum(degree, 60), bins=np.arange(62) - 0.5, color=_COOL)
+    right.hist(np.minimum(degree, 60), bins=np.arange(62) - 0.5, color=COOL)
     right.set_xlabel("transitions from a beat, 60 and more together", fontsize=8)
     right.set_ylabel("beats", fontsize=8)
     for axes in (left, right):
-        _plain(axes)
+        plain(axes)
     return picture(png(figure), "motion graph")
 
 
 def dance_timeline(dance: Dance, steps: Choreography, music_beat_s: Float) -> bytes:
-    """Draw a dance over time as PNG: steps coloured by clip, seams, music beats, warp, and where the body slows."""
+    """Draw a dance over time as PNG: steps coloured by clip, seams, music beats, warp, and where the body slows.
+
+    Parameters
+    ----------
+    dance : Dance of F >= 1 frames
+    steps : Choreography it was assembled from
+    music_beat_s : (B,) float, seconds
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
     from matplotlib import colormaps
 
     clips = sorted(set(steps.clip_id))
     colour = {clip: colormaps["tab20"](i % 20) for i, clip in enumerate(clips)}
-    figure = _figure(min(8 + 0.12 * float(dance.time_s[-1]), 24), 5)
+    figure = figure_of(min(8 + 0.12 * float(dance.time_s[-1]), 24), 5)
     band, warp, speed = figure.subplots(3, 1, sharex=True, height_ratios=(1.2, 1, 1.4))
     length = steps.song_end_s - steps.song_start_s
     band.barh(
         np.zeros(len(length)), length, left=steps.song_start_s, height=1.0, color=[colour[c] for c in steps.clip_id]
     )
     seam_s = steps.song_start_s[steps.has_seam]
-    band.vlines(seam_s, -0.5, 0.5, color=_INK, linewidth=1.2)
-    band.vlines(music_beat_s, 0.5, 0.7, color=_COOL, linewidth=0.7)
+    band.vlines(seam_s, -0.5, 0.5, color=INK, linewidth=1.2)
+    band.vlines(music_beat_s, 0.5, 0.7, color=COOL, linewidth=0.7)
     for number, (a, b) in enumerate(phrases(steps), start=1):
         if steps.song_end_s[b - 1] - steps.song_start_s[a] > 0.012 * float(dance.time_s[-1]):
             band.text(
@@ -263,31 +269,51 @@ def dance_timeline(dance: Dance, steps: Choreography, music_beat_s: Float) -> by
         np.append(steps.song_start_s, steps.song_end_s[-1:]),
         np.append(steps.warp_ratio, steps.warp_ratio[-1:]),
         where="post",
-        color=_INK,
+        color=INK,
     )
     warp.set_ylim(0.75, 1.3)
     warp.set_title("warp: song time over clip time, 0.90 to 1.10 shaded", fontsize=8, loc="left")
     value = mean_speed(dance.position_xyz_m, dance.frame_rate_hz)
     slow = kinematic_beats(dance.position_xyz_m, dance.frame_rate_hz)
-    speed.plot(dance.time_s, value, color=_INK, linewidth=0.8)
-    speed.plot(dance.time_s[slow], value[slow], "o", color=_WARM, markersize=3)
-    speed.vlines(music_beat_s, 0, value.max(initial=0.1), color=_COOL, linewidth=0.4)
+    speed.plot(dance.time_s, value, color=INK, linewidth=0.8)
+    speed.plot(dance.time_s[slow], value[slow], "o", color=WARM, markersize=3)
+    speed.vlines(music_beat_s, 0, value.max(initial=0.1), color=COOL, linewidth=0.4)
     speed.set_title("mean joint speed, m/s; minima red, music beats blue", fontsize=8, loc="left")
     speed.set_xlabel("seconds", fontsize=8)
     speed.set_xlim(0, max(float(dance.time_s[-1]), 0.1))
     for axes in (band, warp, speed):
-        _plain(axes)
+        plain(axes)
     return png(figure)
 
 
 def phrases(steps: Choreography) -> list[tuple[int, int]]:
-    """Find the runs of steps without a seam between them: first step, and one past the last."""
+    """Find the runs of steps without a seam between them: first step, and one past the last.
+
+    Parameters
+    ----------
+    steps : Choreography of S steps
+
+    Returns
+    -------
+    list of (first, end)
+        In order, together all steps; empty for none.
+    """
     start = np.append(0, np.flatnonzero(steps.has_seam))
     return [(a, b) for a, b in zip(start.tolist(), [*start[1:].tolist(), len(steps.clip_id)], strict=True) if b > a]
 
 
 def phrase_table(steps: Choreography) -> str:
-    """List what is danced when, one row a phrase."""
+    """List what is danced when, one row a phrase.
+
+    Parameters
+    ----------
+    steps : Choreography
+
+    Returns
+    -------
+    str
+        Markdown; the headers alone where there are no steps.
+    """
     rows = [
         (
             number,
@@ -304,8 +330,20 @@ def phrase_table(steps: Choreography) -> str:
 
 
 def contact_sheet(dance: Dance, parent: Sequence[int], *, n_figures: int = 16) -> bytes:
-    """Draw stick figures of a dance at even times as PNG, seen from the front right; left blue, right red."""
-    figure = _figure(14, 3.2)
+    """Draw stick figures of a dance at even times as PNG, seen from the front right; left blue, right red.
+
+    Parameters
+    ----------
+    dance : Dance of F >= 1 frames on the canonical skeleton
+    parent : of each joint, -1 for the root
+    n_figures : int, >= 1
+
+    Returns
+    -------
+    bytes
+        PNG.
+    """
+    figure = figure_of(14, 3.2)
     axes = figure.add_subplot()
     frames = np.linspace(0, len(dance.time_s) - 1, n_figures).round().astype(int)
     for i, frame in enumerate(frames):
@@ -314,7 +352,7 @@ def contact_sheet(dance: Dance, parent: Sequence[int], *, n_figures: int = 16) -
         across = across - across[0] + 1.1 * i
         for joint, of in enumerate(parent):
             if of >= 0:
-                side = _COOL if body_side(joint) > 0 else _WARM if body_side(joint) < 0 else _INK
+                side = COOL if body_side(joint) > 0 else WARM if body_side(joint) < 0 else INK
                 axes.plot(
                     across[[joint, of]],
                     body[[joint, of], 1] - 0.12 * (body[[joint, of], 2] - body[0, 2]),
@@ -328,14 +366,29 @@ def contact_sheet(dance: Dance, parent: Sequence[int], *, n_figures: int = 16) -
 
 
 def body_side(joint: int) -> int:
-    """Say whether a canonical joint is on the left (1), the right (-1) or in the middle (0)."""
+    """Say whether a canonical joint is on the left (1), the right (-1) or in the middle (0).
+
+    Parameters
+    ----------
+    joint : int, 0 to 21
+    """
     from kernels.skeleton.canonical import JOINTS
 
     return 1 if JOINTS[joint].startswith("left") else -1 if JOINTS[joint].startswith("right") else 0
 
 
 def measures(found: Sequence[Measure]) -> str:
-    """Write the measures of a dance as a Markdown table."""
+    """Write the measures of a dance as a Markdown table.
+
+    Parameters
+    ----------
+    found : measures of one dance
+
+    Returns
+    -------
+    str
+        Markdown; the headers alone where there are none.
+    """
     word = {True: "yes", False: "**no**", None: ""}
     rows = [(m.name, float(m.value), m.wanted, word[m.is_passed]) for m in found]
     return markdown(("measure", "value", "wanted", "as wanted"), rows)

@@ -10,18 +10,20 @@ from numpy.typing import NDArray
 from assets.direction import Song as SongBeats
 from assets.direction import stretch
 from assets.graph_path import (
-    SOFT_WISH,
     Catalogue,
     Direction,
     path_costs,
     pins_of,
-    refuse_conflict,
+    reach_of,
+    search,
     strength_price,
+    terms_of,
 )
 from kernels.graph.path import STEPS, first_beats, more_than_any
-from kernels.graph.pins import Reach, admitted
+from kernels.graph.pins import admitted
 from kernels.graph.program import Program
 from kernels.graph.proposals import Proposals
+from kernels.graph.structure import structure_pins
 from kernels.types import Float, Int
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import PathSettings, Settings
@@ -72,14 +74,15 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
         ``extra_cost`` over the best dance with the pins that are asked for already, and how many clips it has there;
         ``out_of_reach``, names by kind; ``unpriced_clips`` and the like where a stretch has more than
         :data:`MOST_PROGRAMS` candidates. Costs are those of the dynamic program: exact, all but the price of showing
-        the same again over the whole song.
+        the same again over the whole song. With ``repeat = "structure"`` the parts that come again are those of the
+        best dance, all but the intervals of the place and those that are to show the same.
 
     Raises
     ------
     dg.Failure
         If the pins that are asked for cannot be kept.
     """
-    solved = list(_solved(known, song, settings.path, asked))
+    solved = list(_solved(known, song, settings.path, asked, place))
     if not solved:
         return {"best_cost": None, "labels": [], "styles": [], "clips": [], "out_of_reach": {}}
     most = solved[0][1]
@@ -96,7 +99,7 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
                 "extra_cost": float(prices.cost[i] % most) - found["best_cost"],
                 "steps_outside_warp_bounds": int(prices.cost[i] // most),
                 **(
-                    _of_clip(known, first[i], prices.node[i])
+                    _of_clip(known, place, first[i], prices.node[i])
                     if kind == "clip"
                     else _of_many(known, group == i, prices.node[i])
                 ),
@@ -109,9 +112,12 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
     return found
 
 
-def _of_clip(known: Catalogue, node: int, best: int) -> Mapping[str, Any]:
-    at_s = {} if best < 0 else {"clip_time_s": float(known.graph.time_s[best])}
-    return {"label": str(known.nodes.label[node]), "style": str(known.nodes.style[node]), **at_s}
+def _of_clip(known: Catalogue, place: Asked, node: int, best: int) -> Mapping[str, Any]:
+    told = {"label": str(known.nodes.label[node]), "style": str(known.nodes.style[node])}
+    if best < 0:
+        return told
+    at_s = float(known.graph.time_s[best])
+    return {**told, "clip_time_s": at_s, "pose_pin": f"{place.place}=pose:{known.nodes.clip_id[best]}@{at_s:.3f}"}
 
 
 def _of_many(known: Catalogue, nodes: NDArray[np.bool_], best: int) -> Mapping[str, Any]:
@@ -165,27 +171,27 @@ def _least(through: Float, group: Int, n: int) -> tuple[Float, Int]:
 
 
 def _solved(
-    known: Catalogue, song: SongBeats, settings: PathSettings, asked: Direction
+    known: Catalogue, song: SongBeats, settings: PathSettings, asked: Direction, place: Asked
 ) -> Iterator[tuple[Proposals, float]]:
     """Solve the song as the search would: from first beats, then from any, past the bounds where there is no other way.
 
     The first one is the search's own; those after it are tried for what the ones before cannot have.
     """
     graph, costs = known.graph, path_costs(settings)
-    n_nodes, n_beats = len(graph.clip_index), len(song.grid_s) - 1
-    pins = pins_of(known.nodes, song, asked)
-    mask = np.ascontiguousarray(np.broadcast_to(known.is_allowed, (n_beats, n_nodes)))
-    wish = strength_price(known, song, settings)
-    if pins and asked.is_soft:
-        wish = wish + np.where(admitted(pins, n_beats, n_nodes), 0.0, SOFT_WISH)
-    elif pins:
-        refuse_conflict(known, song, pins, asked, costs)
-        mask = mask & admitted(pins, n_beats, n_nodes)
+    pins = pins_of(known, song, asked, costs)
+    terms = terms_of(known, song, pins, asked, costs, strength_price(known, song, settings))
+    mask = np.ascontiguousarray(terms.admissible)
     every = np.flatnonzero(known.is_allowed)
-    reach = Reach(graph, song.grid_s, costs=costs, starts=every, allowed=known.is_allowed)
+    reach = reach_of(known, song, costs)
     if not reach.is_danceable:
         return
-    most = more_than_any(graph, song.grid_s, costs=costs, interval_price=wish)
+    wished: dict[str, Any] = {"interval_price": terms.interval_price, "step_price": terms.step_price}
+    if settings.repeat == "structure" and song.repeats:
+        best = search(graph, song.grid_s, costs, admissible=mask, **wished)
+        own, _ = structure_pins(best, song.repeats, reach, kept=[] if asked.is_soft else pins)
+        free = _shown_with(place, song)
+        mask = mask & admitted([pin for pin in own if pin.first not in free], *mask.shape)
+    most = more_than_any(graph, song.grid_s, costs=costs, **wished)
     is_begun = False
     for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
         program = Program(
@@ -196,7 +202,7 @@ def _solved(
             admissible=mask,
             bounds=bounds,
             outside_price=price,
-            interval_price=wish,
+            **wished,
         )
         for starts in (np.intersect1d(first_beats(graph), every), every):
             proposals = Proposals(program, starts)
@@ -205,3 +211,19 @@ def _solved(
                 yield proposals, most
         if bounds == reach.bounds:
             return
+
+
+def _shown_with(place: Asked, song: SongBeats) -> set[int]:
+    """Music intervals of a place, and all that repeat them or that they repeat."""
+    found = set(range(place.first, place.last))
+    while True:
+        more = {
+            other
+            for r in song.repeats
+            for later in range(r.first, r.last)
+            for k, other in ((later, r.source + later - r.first), (r.source + later - r.first, later))
+            if k in found
+        }
+        if more <= found:
+            return found
+        found |= more

@@ -408,9 +408,11 @@ def joints_of(
     ----------
     pieces : S lists of pieces
     spans : (S + 1,) float, seconds of the song
-    clips : features of the clips they are in, by name
     canonical_pose : Stored, poses of clips by session
-    settings : Settings
+    blend_s : float, seconds of song, >= 0
+        A blend that would reach past the usable part of a clip costs more.
+    seam_weight : float, >= 0
+        Cost of two poses as unlike as the limits.
 
     Returns
     -------

@@ -34,13 +34,19 @@ MOTION, MUSIC = ("bvh_dance", "bvh_labelled", "bvh_idle", "bvh_varied"), ("audio
 
 @dataclass(frozen=True, eq=False)
 class Danced:
-    """One song and its steps; ``heard_s`` are its own beats, not those added to cover it."""
+    """One song and its steps; ``heard_s`` are its own beats, not those added to cover it, as ``grid_s`` has.
+
+    ``strength`` is the music's in each interval of the grid, ``stay_beats`` what the settings say of stays.
+    """
 
     song_id: str
     duration_s: float
     heard_s: Float
     steps: Choreography
     cost: dict[str, Float]
+    grid_s: Float
+    strength: Float
+    stay_beats: int
 
 
 class BuiltStudio:
@@ -78,7 +84,17 @@ class BuiltStudio:
         """Choose the steps of a song by the graph method."""
         song = self.song(key)
         found = by_graph(known, song, self.settings, Direction())
-        return Danced(key, song.duration_s, song.beats.time_s, found.steps, dict(found.costs))
+        strength = np.zeros(len(song.grid_s) - 1) if song.intensity is None else song.intensity
+        return Danced(
+            key,
+            song.duration_s,
+            song.beats.time_s,
+            found.steps,
+            dict(found.costs),
+            song.grid_s,
+            strength,
+            self.settings.path.stay_beats,
+        )
 
     def clips(self, steps: Choreography) -> dict[str, Clip]:
         """Read the clips that are danced."""

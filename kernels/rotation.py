@@ -218,6 +218,11 @@ def from_matrix(m: Floats) -> Float:
     Returns
     -------
     (..., 4) float64, wxyz, unit, w >= 0
+
+    Raises
+    ------
+    ValueError
+        If a value is not finite.
     """
     m = np.asarray(m, np.float64)
     m00, m11, m22 = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]

@@ -55,7 +55,21 @@ class Skeleton:
             raise ValueError(f"offset_xyz_m: want finite ({n}, 3), got {self.offset_xyz_m.shape}")
 
     def index(self, joint: str) -> int:
-        """Position of a joint by name; ValueError when it is not there."""
+        """Find the position of a joint by its name.
+
+        Parameters
+        ----------
+        joint : str
+
+        Returns
+        -------
+        int, 0 to J - 1
+
+        Raises
+        ------
+        ValueError
+            If no joint has this name.
+        """
         if joint not in self.joints:
             raise ValueError(f"joint: want one of {', '.join(self.joints)}, got {joint!r}")
         return self.joints.index(joint)

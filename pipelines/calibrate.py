@@ -17,7 +17,7 @@ from assets.calibration import Calibrated, CalibrationError, calibrate_file
 from assets.formats import bvh
 from assets.formats.errors import FormatError
 from assets.formats.settings import read_settings
-from assets.sources import POSES_ENDING
+from assets.scan import POSES_ENDING
 from kernels.calibration.records import JOINTS, PARENT, Calibration
 from kernels.calibration.tree_solver import PoseSolver
 from pipelines.files import write_beside

@@ -8,16 +8,18 @@ from typing import Any
 
 import polars as pl
 
-from assets import direction, tables
+from assets import direction, pose_pins, tables
 from assets.formats import usd_package
-from assets.graph_path import direction_of
+from assets.graph_path import direction_of, poses_of
 from assets.partitions import alternative_number, base_method
 from assets.stage import COSTS
 from kernels.assembly.timing import cover
 from pipelines import hmm_report
 from pipelines.files import StudioError, write_beside
+from pipelines.io_managers import StoredTable
 from pipelines.resources import StudioFolder
 from schemas.choreography import CHOREOGRAPHY
+from schemas.pins import PinWish
 
 
 def dances_facts(made: list[dict[str, Any]], troubles: list[str], n_asked: int) -> dict[str, Any]:
@@ -99,10 +101,14 @@ def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame
     duration_s = max(studio.lake.table("song", song)["duration_s"].to_pylist())
     played = direction.Song(cover(beats.time_s, duration_s)[0], beats, duration_s)
     clips = {row["clip_id"]: row for s in studio.lake.keys("clip") for row in studio.lake.table("clip", s).to_pylist()}
+    posed = _Posed(studio, song, method, played) if any(wish.pose for wish in wishes) else None
     facts = []
     for wish in wishes:
         first, last = direction.stretch(wish, played)
         from_s, to_s = max(played.grid_s[first], 0.0), min(played.grid_s[last], duration_s)
+        if posed and wish.pose:
+            facts.append({"pin": wish.text, "from_s": float(from_s), "to_s": float(to_s), **posed.facts(wish)})
+            continue
         here = steps.filter((pl.col("song_end_s") > from_s + 1e-6) & (pl.col("song_start_s") < to_s - 1e-6))
         danced = here["clip_id"].unique(maintain_order=True).to_list()
         facts.append(
@@ -115,6 +121,27 @@ def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame
             }
         )
     return facts
+
+
+class _Posed:
+    """What a finished dance shows at the moments of pins of a pose."""
+
+    def __init__(self, studio: StudioFolder, song: str, method: str, played: direction.Song) -> None:
+        lake, key = studio.lake, f"{song}|{method}"
+        self._played = played
+        self._lineage = pl.DataFrame(lake.table("frame_lineage", key))
+        frames = lake.table("dance_pose", key)
+        moved = [tables.to_array(frames[name]) for name in ("root_xyz_m", "rotation_wxyz", "position_xyz_m")]
+        self._dance = tables.CanonicalClip(key, tables.frame_rate_hz(frames), *moved)
+        stored = StoredTable(lake, "canonical_pose", lake.keys("canonical_pose"))
+        self._poses = poses_of(stored, studio.settings())
+        self._nodes = pl.DataFrame(lake.table("motion_graph_node"))
+
+    def facts(self, wish: PinWish) -> dict[str, Any]:
+        """Tell of one pin: the clip shown, when, how far from the pose, whether that is near enough."""
+        moment_s = pose_pins.moment_of(wish, self._played)
+        shown = pose_pins.shown_pose(wish, moment_s, self._lineage, self._dance, self._poses, self._nodes)
+        return {"clips": [shown["shown_clip_id"]] if "shown_clip_id" in shown else [], **shown}
 
 
 def _named(clip: Mapping[str, Any]) -> dict[str, str]:
@@ -145,8 +172,7 @@ def report_of(facts: dict[str, Any]) -> str:
         )
     lines.append(f"  licence {facts['licence']['name']}: {facts['licence']['sentence']}")
     lines += [
-        f"  pin {p['pin']}: {'kept' if p['is_kept'] else 'not kept'}, {', '.join(p['clips'])} "
-        f"from {p['from_s']:.2f} to {p['to_s']:.2f} s"
+        f"  pin {p['pin']}: {'kept' if p['is_kept'] else 'not kept'}, {', '.join(p['clips'])} {_when(p)}"
         for p in facts["pins"]
     ]
     if facts["not_as_wanted"]:
@@ -154,6 +180,17 @@ def report_of(facts: dict[str, Any]) -> str:
     if "model" in facts:
         lines += hmm_report.report_lines(facts["model"])
     return "\n".join(lines)
+
+
+def _when(pin: Mapping[str, Any]) -> str:
+    """Say when a pin is danced; of a pose, which moment is shown and how far it is from what was wished."""
+    if "distance_m" not in pin:
+        return f"from {pin['from_s']:.2f} to {pin['to_s']:.2f} s"
+    turned = " mirrored" if pin["is_mirrored"] else ""
+    apart_cm = 100 * pin["distance_m"]
+    return (
+        f"at {pin['shown_time_s']:.2f} s{turned}, joints {apart_cm:.1f} cm from it in the mean, at {pin['at_s']:.2f} s"
+    )
 
 
 def check_out(out: Path) -> None:

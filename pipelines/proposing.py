@@ -6,9 +6,10 @@ from typing import Any
 import dagster as dg
 
 from assets import proposals, tables
-from assets.graph_path import catalogue, direction_of, heard_song, read_clips
+from assets.graph_path import catalogue, direction_of, heard_song, poses_of, read_clips
 from assets.sources import Request
 from pipelines.files import StudioError
+from pipelines.io_managers import StoredTable
 from pipelines.outcome import DONE, NOTHING_DONE, Outcome
 from pipelines.resources import StudioFolder
 
@@ -44,7 +45,8 @@ def propose(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) ->
     asked = direction_of(_Asked(studio, f"{song}|graph", pins), f"{song}|graph")
     graph, clip_ids = tables.to_motion_graph(lake.table("motion_graph_node"), lake.table("motion_graph_edge"))
     clips = read_clips([lake.table("clip", session) for session in lake.keys("clip")])
-    known = catalogue(graph, clip_ids, clips, asked.allow)
+    poses = poses_of(StoredTable(lake, "canonical_pose", lake.keys("canonical_pose")), studio.settings())
+    known = catalogue(graph, clip_ids, clips, asked.allow, poses=poses)
     try:
         found = proposals.propose(known, played, studio.settings(), asked, at)
     except dg.Failure as refused:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from upath import UPath
 
-from assets import sources
+from assets import scan, sources
 from assets.formats.settings import read_settings
 from assets.formats.tree import HashCache
 from assets.matching import SegmentMatcher
@@ -46,7 +46,7 @@ class StudioFolder:
     def sources(self) -> Sources:
         """List what is there, hashed; files that did not change are not read again."""
         cache = HashCache(self.root / "lake" / "hashes.json")
-        return sources.scan(self.root, self.settings(), sessions_in_use=self.lake.keys("clip"), cache=cache)
+        return scan.scan(self.root, self.settings(), sessions_in_use=self.lake.keys("clip"), cache=cache)
 
     def settings(self) -> Settings:
         """Read ``odori.toml``."""

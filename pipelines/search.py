@@ -73,7 +73,7 @@ class Motion:
     clip_id : of the catalogue; empty for a file outside it
     start_s, end_s : the stretch of it that counts
     vector : (W, D) float32 of its windows
-    position_xyz_m, frame_rate_hz : canonical, where it had to be read
+    poses : canonical positions, (F, 22, 3) metres, and their rate in Hz, where they were read; else None
     """
 
     text: str

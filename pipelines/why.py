@@ -15,6 +15,7 @@ from assets.tables import frame_rate_hz
 from pipelines.files import StudioError
 from pipelines.outcome import DONE, Outcome
 from pipelines.resources import StudioFolder
+from schemas.keys import mirrored, seen_label
 
 STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
@@ -70,7 +71,7 @@ def moment(told: Told, at_s: float) -> dict[str, Any]:
         "time_s": round(index / told.frame_rate_hz, 6),
         "clip_id": here["odori:clip"],
         "clip_time_s": round(float(here["odori:clipTime"]), 4),
-        **_facts(clip),
+        **_facts(clip, is_mirrored=bool(here["odori:mirrored"])),
         "warp_ratio": round(float(here["odori:warp"]), 4),
         "is_mirrored": bool(here["odori:mirrored"]),
         "blend": {
@@ -78,16 +79,18 @@ def moment(told: Told, at_s: float) -> dict[str, Any]:
             "clip_time_s": round(float(here["odori:blendTime"]), 4) if is_blended else None,
             "is_mirrored": bool(here["odori:blendMirrored"]),
             "weight_ratio": round(float(here["odori:blendWeight"]), 4),
-            **(_facts(partner) if is_blended else {}),
+            **(_facts(partner, is_mirrored=bool(here["odori:blendMirrored"])) if is_blended else {}),
         },
         "step": step,
         "pin": step["pin"],
     }
 
 
-def _facts(clip: Mapping[str, Any]) -> dict[str, Any]:
+def _facts(clip: Mapping[str, Any], *, is_mirrored: bool = False) -> dict[str, Any]:
+    """Gather what is known of a clip; the label is that of what is seen."""
     names = ("session", "label", "style", "path", "sha256", "licence")
-    return {name: clip.get(name, "") for name in names}
+    facts = {name: clip.get(name, "") for name in names}
+    return facts | {"label": seen_label(facts["label"] or "", mirrored("")) if is_mirrored else facts["label"]}
 
 
 def _lines(facts: Mapping[str, Any]) -> list[str]:
@@ -120,7 +123,10 @@ def _reason(step: Mapping[str, Any]) -> str:
 def _whole(told: Told) -> Outcome:
     """List every step of a dance, the clips it shows and their licence."""
     steps = [json.loads(text) for text in dict.fromkeys(told.frames["odori:step"])]
-    named = [{**step, **_facts(told.clips.get(step["clip_id"], {}))} for step in steps]
+    named = [
+        {**step, **_facts(told.clips.get(step["clip_id"], {}), is_mirrored=step.get("is_mirrored", False))}
+        for step in steps
+    ]
     facts = {
         "dance": told.name,
         "duration_s": round(told.duration_s, 4),
@@ -200,6 +206,7 @@ def find_dance(studio: StudioFolder, text: str, preferred: str) -> str:
 
     Parameters
     ----------
+    studio : StudioFolder
     text : key of a ``song``, or ``song|method``
     preferred : method to take where a song is danced by several
 

@@ -9,7 +9,7 @@ from schemas.table import Column, Table
 
 CHOREOGRAPHY = Table(
     name="choreography",
-    version=3,
+    version=4,
     meaning="One step: an interval of the song danced with an interval of a clip.",
     key=("song_id", "method_name", "step_index"),
     columns=(
@@ -27,6 +27,7 @@ CHOREOGRAPHY = Table(
         f.WARP_RATIO,
         Column("pin_id", pa.string(), "The pin this step serves; null when none.", is_optional=True),
         Column("transition_cost", pa.float32(), "Cost of the seam before the step, by how the poses differ."),
+        Column("stay_cost", pa.float32(), "Cost of the seam before the step coming soon after the one before it."),
         Column("warp_cost", pa.float32(), "Cost of leaving the clip's own pace."),
         Column("match_cost", pa.float32(), "Cost of rhythm unlike the music's; 0 but on a match's first step."),
         Column("intensity_cost", pa.float32(), "Cost of intensity unlike the music's; 0 but on a match's first step."),

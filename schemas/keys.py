@@ -23,7 +23,22 @@ def is_key(text: str) -> bool:
 
 
 def check_key(text: str) -> str:
-    """Return a legal key as it is, or raise ValueError."""
+    """Refuse a text that is no legal key.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+        The text as it is.
+
+    Raises
+    ------
+    ValueError
+        If it is empty, too long, or has other signs.
+    """
     if not is_key(text):
         raise ValueError(f"key: want lower-case letters, digits, '_' and '-', at most {LONGEST_KEY}, got {text!r}")
     return text
@@ -59,7 +74,17 @@ def slug(text: str, *, longest: int = LONGEST_KEY) -> str:
 
 
 def session_key(folders: Sequence[str]) -> str:
-    """Key of a session from the names of its folders below ``clips/``; ``clips`` for that folder itself."""
+    """Key of a session from the names of its folders below ``clips/``; ``clips`` for that folder itself.
+
+    Parameters
+    ----------
+    folders : names from the outermost on, any strings
+
+    Returns
+    -------
+    str
+        A legal key of at most 32 characters; a longer one is cut and ends in a hash of the folders.
+    """
     key = "-".join(slug(name) for name in folders) or "clips"
     if len(key) <= _LONGEST_SESSION:
         return key
@@ -67,7 +92,18 @@ def session_key(folders: Sequence[str]) -> str:
 
 
 def clip_key(folders: Sequence[str], stem: str) -> str:
-    """Key of a clip: its folder's session key and its own name."""
+    """Key of a clip: its folder's session key and its own name.
+
+    Parameters
+    ----------
+    folders : as for :func:`session_key`
+    stem : name of the file without its suffix
+
+    Returns
+    -------
+    str
+        A legal key.
+    """
     return f"{session_key(folders)}-{slug(stem, longest=_LONGEST_TAKE)}"
 
 
@@ -89,19 +125,57 @@ def source_clip(name: str) -> str:
     return name.removesuffix(_MIRRORED)
 
 
+def seen_label(label: str, name: str) -> str:
+    """Label of what a clip shows by the name it is danced under: mirrored, ``wave-right-hand`` is ``wave-left-hand``.
+
+    Parameters
+    ----------
+    label : of the clip; the words ``left`` and ``right`` change places in a mirror, whatever letters they are in
+    name : key of a clip, or of its mirror image
+    """
+    return _SIDE.sub(lambda word: _as(word[0], _OTHER[word[0].lower()]), label) if is_mirrored(name) else label
+
+
+_OTHER = {"left": "right", "right": "left"}
+_SIDE = re.compile(r"(?<![a-z])(left|right)(?![a-z])", re.IGNORECASE)
+
+
+def _as(word: str, other: str) -> str:
+    """Spell a word with capitals as another has them."""
+    return other.upper() if word.isupper() else other.capitalize() if word[0].isupper() else other
+
+
 def song_key(stem: str) -> str:
     """Key of a song from its file's name without suffix."""
     return slug(stem)
 
 
 def part_key(session: str, part: int, n_parts: int) -> str:
-    """Key of one part of a session too large for one partition."""
+    """Key of one part of a session too large for one partition.
+
+    Parameters
+    ----------
+    session : key of the session
+    part : int, 0 to ``n_parts`` - 1
+    n_parts : int, >= 2
+    """
     width = len(str(n_parts - 1))
     return f"{session}-part_{part:0{width}d}_of_{n_parts}"
 
 
 def part_of(name: str, n_parts: int) -> int:
-    """Part a clip belongs to, by a hash of its name: the same however many others come and go."""
+    """Find the part a clip belongs to, by a hash of its name: the same however many others come and go.
+
+    Parameters
+    ----------
+    name : str
+        Of the clip's file.
+    n_parts : int, >= 1
+
+    Returns
+    -------
+    int, 0 to ``n_parts`` - 1
+    """
     return int(hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8], 16) % n_parts
 
 
@@ -109,6 +183,16 @@ _PART = re.compile(r"(?P<session>.+)-part_\d+_of_(?P<n_parts>\d+)")
 
 
 def parts_in_use(session_keys: Sequence[str]) -> dict[str, int]:
-    """How many parts each split session has, read back from the keys of its parts."""
+    """Read back how many parts each split session has from the keys of its parts.
+
+    Parameters
+    ----------
+    session_keys : of the sessions and parts of sessions there are
+
+    Returns
+    -------
+    dict
+        Number of parts by session; sessions in one piece are left out.
+    """
     found = (_PART.fullmatch(key) for key in session_keys)
     return {m["session"]: int(m["n_parts"]) for m in found if m}

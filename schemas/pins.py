@@ -12,8 +12,10 @@ place           in a brief                 the stretch of the song
 ``start``       ``place = "start"``        the first beat interval; ``end``: the last
 ==============  =========================  ==============================================
 
-Wishes: ``LABEL`` or ``label:LABEL``, ``style:STYLE``, ``clip:KEY``, ``not:LABEL``. Several keys of clips are joined by
-commas: any of them. On the command line ``like:KEY`` names the clips most like one.
+Wishes: ``LABEL`` or ``label:LABEL``, ``style:STYLE``, ``clip:KEY``, ``not:LABEL``, ``pose:KEY@SECONDS``. Several keys
+of clips are joined by commas: any of them. On the command line ``like:KEY`` names the clips most like one. A pose is
+that of a clip at a moment of it, to be shown on the first beat of the place; at the start in the first frame, at the
+end in the last.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ from schemas.options import check, key
 _NUMBER = r"\d+(?:\.\d*)?|\.\d+"
 _SECONDS = re.compile(rf"(?P<at>{_NUMBER})(?:-(?P<until>{_NUMBER}))?")
 _COUNTED = re.compile(r"(?P<unit>beat|bar):(?P<first>\d+)(?:-(?P<last>\d+))?")
-_WISHES = {"label": "label", "style": "style", "clip": "clip", "not": "not_label"}
+_POSE = re.compile(rf"(?P<clip>[^@]+)@(?P<at>{_NUMBER})")
+_WISHES = {"label": "label", "style": "style", "clip": "clip", "not": "not_label", "pose": "pose"}
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class PinWish:
     style: str = key("", "Style to be danced.")
     clip: str = key("", "Clip to be danced, by its key; of several, joined by commas, any.")
     not_label: str = key("", "Label not to be danced.")
+    pose: str = key("", "Pose to be shown, as KEY@SECONDS: that of a clip at a moment of it.")
 
     def __post_init__(self) -> None:
         check(self)
@@ -61,7 +65,9 @@ class PinWish:
         wishes = [name for name in _WISHES.values() if getattr(self, name)]
         if len(wishes) != 1:
             got = " and ".join(wishes) or "none"
-            raise ValueError(f"pin: want one wish (label, style, clip or not_label), got {got}")
+            raise ValueError(f"pin: want one wish (label, style, clip, not_label or pose), got {got}")
+        if self.pose and not _POSE.fullmatch(self.pose):
+            raise ValueError(f"pin: want a pose as KEY@SECONDS, as in pose:kaede-spin_01@2.5, got {self.pose!r}")
         for first, last, least in (("at", "until", 0.0), ("beat", "until_beat", 1), ("bar", "until_bar", 0)):
             a, b = getattr(self, first), getattr(self, last)
             if b > 0 and not (a >= 0 and b - a >= least and b >= a and not (first == "at" and b == a)):
@@ -85,12 +91,20 @@ class PinWish:
         """Keys of the clips wished for."""
         return [name.strip() for name in self.clip.split(",")] if self.clip else []
 
+    @property
+    def pose_moment(self) -> tuple[str, float]:
+        """Key of the clip whose pose is wished for, and seconds from its first frame; ``("", 0.0)`` for none."""
+        found = _POSE.fullmatch(self.pose)
+        return (found["clip"].strip(), float(found["at"])) if found else ("", 0.0)
+
     def is_kept_by(self, *, clip_id: str, label: str, style: str) -> bool:
-        """Whether a clip is what the pin wishes."""
+        """Whether a clip is what the pin wishes; of a pose no clip alone can tell, and any is."""
         if self.clip:
             return clip_id in self.clips
         if self.style:
             return style == self.style
+        if self.pose:
+            return True
         return label != self.not_label if self.not_label else label == self.label
 
 
@@ -131,7 +145,8 @@ def parse_pin(text: str) -> PinWish:
         values["label"] = wish
     if not (equals and values and (where in ("start", "end") or seconds or counted)):
         raise ValueError(
-            f"pin: want PLACE=WISH, as in 42=spin, 12.5-16=clip:KEY, beat:8-16=not:walk or bar:3=waltz, got {text!r}"
+            f"pin: want PLACE=WISH, as in 42=spin, 12.5-16=clip:KEY, beat:8-16=not:walk, bar:3=waltz or "
+            f"start=pose:KEY@2.5, got {text!r}"
         )
     try:
         return PinWish(**values)  # type: ignore[arg-type]  # the names are those of its fields

@@ -97,8 +97,12 @@ class PathSettings(_Checked):
     transition_weight: float = key(1.0, "Weight of seams, by pose distance.", least=0)
     warp_weight: float = key(1.0, "Weight of leaving a clip's own pace.", least=0)
     repetition_weight: float = key(1.0, "Weight of showing again what was shown.", least=0)
-    intensity_weight: float = key(2.0, "Weight of movement unlike the music in strength.", least=0)
+    intensity_weight: float = key(6.0, "Weight of movement unlike the music in strength.", least=0)
     seam_cost: float = key(1.0, "Price of any seam: more makes phrases longer.", least=0)
+    stay_beats: int = key(
+        4, "Beats of the music that a clip should be stayed with between two seams.", least=1, most=32
+    )
+    stay_cost: float = key(4.0, "Price of a seam right after another, falling evenly to 0 at `stay_beats`.", least=0)
     repeat: str = key(
         "none",
         "'structure': where the song plays a part again, its dance is danced again; 'none': each part has its own.",

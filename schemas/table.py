@@ -94,11 +94,28 @@ class Table:
         return pa.schema([c.arrow for c in self.columns], metadata=metadata)
 
     def empty(self, metadata: Mapping[str, str] | None = None) -> pa.Table:
-        """Return a table of no rows."""
+        """Make a table of no rows.
+
+        Parameters
+        ----------
+        metadata : as ``extra`` of :meth:`with_metadata`; None for none
+        """
         return self.with_metadata(self.arrow.empty_table(), metadata or {})
 
     def with_metadata(self, table: pa.Table, extra: Mapping[str, str]) -> pa.Table:
-        """Return the table with this schema's metadata and ``extra`` beside it (for example ``joints``)."""
+        """Put this schema's metadata on a table, and more beside it (for example ``joints``).
+
+        Parameters
+        ----------
+        table : pyarrow.Table
+            Not checked; metadata it had is dropped.
+        extra : texts by name; they win
+
+        Returns
+        -------
+        pyarrow.Table
+            The same rows.
+        """
         return table.replace_schema_metadata(
             {**(self.arrow.metadata or {}), **{k.encode(): v for k, v in extra.items()}}
         )

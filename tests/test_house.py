@@ -118,15 +118,27 @@ def test_no_index_host_and_no_path_of_a_machine():
     assert found == []
 
 
-# Every public function of these tells its arguments and its errors; the list grows until it is kernels.
-DOCUMENTED = [
-    *(REPOSITORY / "kernels" / "assembly").glob("*.py"),
-    *(REPOSITORY / "kernels" / "calibration").glob("*.py"),
-    *(REPOSITORY / "kernels" / "matching").glob("*.py"),
-    *(REPOSITORY / "assets" / f"{name}.py" for name in ("matching", "matching_plots", "matching_tables", "sequence")),
-    *(REPOSITORY / "kernels" / f"{name}.py" for name in ("graph/costs", "graph/prune", "graph/transitions")),
-    *(REPOSITORY / "kernels" / f"{name}.py" for name in ("skeleton/axes", "skeleton/kinematics", "motion/velocity")),
-]
+# Every public function tells its arguments and its errors. Where the one argument is a name or a path (`str`, `Path`),
+# its summary does: there is no shape, unit or range to say. What is named here is left to do; the list only shrinks.
+UNDOCUMENTED = {
+    f"{folder}/{name}.py"
+    for folder, names in {
+        "kernels/graph": "alternatives distance features nodes path pins program",
+        "kernels/hmm": "character durations evidence instances model states viterbi",
+        "kernels/search": "augment discriminant document encoder fit measure network train",
+        "kernels/motion": "contacts key_poses",
+        "kernels/music": "percussion",
+        "kernels/synthetic": "performance",
+        "schemas": "pins",
+        "assets/formats": "usd_character",
+        "assets": "characters dance direction graph_memory graph_path hmm_path hmm_plots hmm_tables proposals "
+        "search_plots search_tables stage tables",
+        "pipelines": "build calibrate cli collection commands dancing files freshness hmm_report io_managers jobs lake "
+        "progress resources schedules sensors status web why",
+    }.items()
+    for name in names.split()
+}
+DOCUMENTED = [p for p in SOURCES if str(p.relative_to(REPOSITORY)) not in UNDOCUMENTED]
 
 
 def _is_asset(node):
@@ -142,9 +154,44 @@ def test_public_functions_tell_their_arguments_and_errors(path):
         if not isinstance(node, ast.FunctionDef) or node.name.startswith("_") or _is_asset(node):
             continue  # of an asset Dagster shows the summary, and its arguments are the tables it is made from
         text = ast.get_docstring(node) or ""
-        named = [a.arg for a in (*node.args.args, *node.args.kwonlyargs) if a.arg != "self"]
-        if named and "Parameters\n---" not in text and "arguments and errors are theirs" not in text:
+        named = [a for a in (*node.args.args, *node.args.kwonlyargs) if a.arg not in ("self", "cls")]
+        is_plain = len(named) == 1 and re.fullmatch(r"(str|Path)( \| (str|Path))?", ast.unparse(named[0].annotation))
+        has_sections = "Parameters\n---" in text or "arguments and errors are theirs" in text
+        if named and not is_plain and not has_sections:
             missing.append(f"{node.name}: Parameters")
         if any(isinstance(n, ast.Raise) for n in ast.walk(node)) and "Raises\n---" not in text:
             missing.append(f"{node.name}: Raises")
     assert missing == []
+
+
+def _documented(text):
+    """Names in the Parameters section of a docstring."""
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=\n\n[A-Z][A-Za-z ]+\n-{3,}|\Z)", text, re.DOTALL | re.MULTILINE)
+    lines = section[1].splitlines() if section else []
+    return {name.strip(" *") for line in lines if line[:1].strip() for name in line.split(" : ")[0].split(",")}
+
+
+def _arguments(node):
+    """Names of what a function, a record or a class takes."""
+    if isinstance(node, ast.ClassDef):
+        made = [n for n in node.body if isinstance(n, ast.FunctionDef) and n.name == "__init__"]
+        if not made:
+            return {n.target.id for n in node.body if isinstance(n, ast.AnnAssign)}
+        node = made[0]
+    extra = [a for a in (node.args.vararg, node.args.kwarg) if a]
+    named = {a.arg for a in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, *extra)}
+    return named - {"self", "cls"}
+
+
+@pytest.mark.parametrize("path", sorted(DOCUMENTED), ids=lambda p: str(p.relative_to(REPOSITORY)))
+def test_documented_parameters_are_those_there_are(path):
+    body = ast.parse(path.read_text()).body
+    body += [n for c in body if isinstance(c, ast.ClassDef) for n in c.body]
+    wrong = {
+        node.name: sorted(_documented(text) ^ _arguments(node))
+        for node in body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and _documented(text := ast.get_docstring(node) or "")
+        and _documented(text) != _arguments(node)
+    }
+    assert wrong == {}

@@ -215,7 +215,18 @@ def format_wav(audio: Audio) -> bytes:
 
 
 def write_wav(path: Path, audio: Audio) -> None:
-    """Write :func:`format_wav` beside ``path``, then rename: the file is whole or not there."""
+    """Write :func:`format_wav` beside ``path``, then rename: the file is whole or not there.
+
+    Parameters
+    ----------
+    path : Path; folders are made
+    audio : Audio
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; what stood at ``path`` before still stands.
+    """
     with written_beside(path) as partial:
         partial.write_bytes(format_wav(audio))
 

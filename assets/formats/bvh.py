@@ -17,7 +17,7 @@ import numpy as np
 
 from assets.formats.bvh_header import parse_header
 from assets.formats.bvh_values import parse_values
-from assets.formats.errors import FormatError
+from assets.formats.errors import FormatError, check_size
 from kernels import rotation
 from kernels.skeleton import alignment, axes, kinematics, naming
 from kernels.types import Clip, Float, Int, Skeleton
@@ -80,13 +80,7 @@ def read(path: Path | str, *, max_bytes: int = MAX_BYTES) -> Bvh:
         If it cannot be opened.
     """
     path = Path(path)
-    size = path.stat().st_size
-    if size > max_bytes:
-        raise FormatError(
-            str(path),
-            0,
-            f"want at most {max_bytes / 1e6:.0f} MB, got {size / 1e6:.0f} MB; cut the recording into takes",
-        )
+    check_size(path, max_bytes=max_bytes)
     return parse(path.read_bytes(), str(path))
 
 

@@ -107,9 +107,18 @@ def _seconds(text: str, path: str, line: int) -> float:
 
 
 def misspelt_columns(data: bytes) -> dict[str, str]:
-    """Name the columns nobody reads that are nearly one we read, which goes unnamed, and that one.
+    """Name the columns nobody reads that are nearly one we read, which goes unnamed.
 
-    Other columns are a data set's own business. Empty for what is no table.
+    Other columns are a data set's own business.
+
+    Parameters
+    ----------
+    data : bytes, UTF-8; what is not is replaced
+
+    Returns
+    -------
+    dict
+        The column meant by the column found, in lower case. Empty where none is nearly one of ours, and for no table.
     """
     header = next(csv.reader(io.StringIO(data.decode("utf-8-sig", errors="replace"), newline="")), [])
     names = [name.strip().lower() for name in header]

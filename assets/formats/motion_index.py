@@ -46,7 +46,24 @@ class StoredIndex:
     approximate: str = ""
 
     def candidates(self, query: Vectors, n: int) -> NDArray[np.int64]:
-        """Find rows that may be near: (Q, D) float32 to row numbers, about ``n`` a query."""
+        """Find rows that may be near, by the graph.
+
+        Parameters
+        ----------
+        query : (Q, D) float32, unit, as the rows' vectors
+        n : int, >= 1
+            Rows asked for a query.
+
+        Returns
+        -------
+        (M,) int64, rising row numbers, at most Q n
+            Those of all queries together.
+
+        Raises
+        ------
+        ValueError
+            If the index has no graph.
+        """
         from usearch.index import Index
 
         graph: Any = Index.restore(str(self.folder / self.approximate), view=True)
@@ -116,7 +133,18 @@ def write_vectors(folder: Path, rows: pa.Table, vector: Vectors, *, exact_up_to:
 
 
 def remove_others(folder: Path, kept: Mapping[str, str]) -> None:
-    """Delete vectors and graphs of earlier indices, once the rows name others."""
+    """Delete vectors and graphs of earlier indices, once the rows name others.
+
+    Parameters
+    ----------
+    folder : of the index; nothing happens where it is missing
+    kept : its values are names of files that stay, as :func:`write_vectors` says them
+
+    Raises
+    ------
+    OSError
+        If a file cannot be removed; one that is gone already is no error.
+    """
     for path in folder.glob("*-*.*"):
         if path.suffix in (".f32", ".usearch") and path.name not in kept.values():
             path.unlink(missing_ok=True)
@@ -139,12 +167,12 @@ def _write_graph(folder: Path, rows: pa.Table, vector: Vectors) -> dict[str, str
     name = f"graph-{hashlib.sha256(keys.tobytes()).hexdigest()[:16]}.usearch"
     with beside.written_beside(folder / name) as partial:
         graph.save(str(partial))
-    recall = measured_recall(StoredIndex(rows, vector, folder, name))
+    recall = _recall(StoredIndex(rows, vector, folder, name))
     return {"approximate": name, "recall": f"{recall:.4f}"}
 
 
-def measured_recall(index: StoredIndex) -> float:
-    """Share of the ten nearest rows that the graph finds, over evenly spread rows as queries."""
+def _recall(index: StoredIndex) -> float:
+    """Measure the share of the ten nearest rows that the graph finds, over evenly spread rows as queries."""
     at = np.unique(np.linspace(0, len(index.vector) - 1, _RECALL_QUERIES).round().astype(int))
     found = total = 0
     for row in at.tolist():

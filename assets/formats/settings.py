@@ -41,12 +41,44 @@ def parse(text: str, kind: type[Record], path: str = "odori.toml") -> Record:
 
 
 def read_settings(path: Path) -> Settings:
-    """Read ``odori.toml``; every default where there is no such file."""
+    """Read ``odori.toml``; every default where there is no such file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Settings
+
+    Raises
+    ------
+    FormatError
+        If the file is not UTF-8, or as :func:`parse`.
+    OSError
+        If it cannot be read.
+    """
     return parse(_text(path), Settings, path.name)
 
 
 def read_brief(path: Path) -> Brief:
-    """Read a song's brief; every default where there is no such file."""
+    """Read a song's brief; every default where there is no such file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Brief
+
+    Raises
+    ------
+    FormatError
+        If the file is not UTF-8, or as :func:`parse`.
+    OSError
+        If it cannot be read.
+    """
     return parse(_text(path), Brief, path.name)
 
 

@@ -28,6 +28,10 @@ def is_recording(path: Path | str) -> bool:
     """Whether a CSV's first line has the columns of a recording, complete or not; a Parquet file always counts.
 
     Nothing but the first line is read. False for a file that cannot be opened.
+
+    Parameters
+    ----------
+    path : file
     """
     path = Path(path)
     if path.suffix.lower() == ".parquet":
@@ -73,7 +77,22 @@ def read(
 
 
 def parse(columns: Columns, *, sensors: Mapping[str, str] | None = None, unit: str = "auto") -> Suit:
-    """Read the columns of a recording; as :func:`read`."""
+    """Read the columns of a recording.
+
+    Parameters
+    ----------
+    columns : of the file, as read
+    sensors, unit : as for :func:`read`
+
+    Returns
+    -------
+    Suit
+
+    Raises
+    ------
+    FormatError
+        If the columns are those of neither form, or their rows contradict each other.
+    """
     own = dict(sensors or {})
     if suit_long.is_long(columns.names):
         return suit_long.parse(columns, own)
@@ -86,7 +105,17 @@ def parse(columns: Columns, *, sensors: Mapping[str, str] | None = None, unit: s
 
 
 def format_parquet(recording: Recording) -> bytes:
-    """Write a recording as Parquet in the long form; the same recording gives the same bytes."""
+    """Write a recording as Parquet in the long form; the same recording gives the same bytes.
+
+    Parameters
+    ----------
+    recording : Recording of F frames and S sensors
+
+    Returns
+    -------
+    bytes
+        F S rows.
+    """
     sink = io.BytesIO()
     pq.write_table(
         suit_long.to_table(recording), sink, compression="zstd", use_dictionary=["frame", "time_s", "sensor"]
@@ -95,7 +124,17 @@ def format_parquet(recording: Recording) -> bytes:
 
 
 def format_csv(recording: Recording) -> bytes:
-    """Write a recording as CSV in the long form."""
+    """Write a recording as CSV in the long form; the same recording gives the same bytes.
+
+    Parameters
+    ----------
+    recording : Recording of F frames and S sensors
+
+    Returns
+    -------
+    bytes
+        A header and F S lines.
+    """
     sink = io.BytesIO()
     pc_csv.write_csv(suit_long.to_table(recording), sink, pc_csv.WriteOptions(quoting_style="none"))
     return sink.getvalue()

@@ -18,7 +18,7 @@ import pyarrow.compute as pc
 import pyarrow.csv as pc_csv
 import pyarrow.parquet as pq
 
-from assets.formats.errors import FormatError
+from assets.formats.errors import FormatError, check_size
 from kernels.types import Float
 
 MAX_BYTES = 1 << 30
@@ -65,7 +65,14 @@ class Columns:
         return int(self.table.num_rows)
 
     def error(self, row: int | None, what: str) -> FormatError:
-        """Make the error about a row, counted from 0; about the file where it is None."""
+        """Make the error about a row or the whole file, for the caller to raise.
+
+        Parameters
+        ----------
+        row : int or None
+            From 0; None for the file. In a text file the message names the row's line.
+        what : the sentence
+        """
         if row is None:
             return FormatError(self.path, 0, what)
         if self.first_line:
@@ -73,7 +80,22 @@ class Columns:
         return FormatError(self.path, 0, f"row {int(row) + 1}: {what}")
 
     def numbers(self, name: str) -> Float:
-        """Read a column as numbers, (N,) float64, NaN where nothing stands."""
+        """Read a column as numbers.
+
+        Parameters
+        ----------
+        name : one of the columns
+
+        Returns
+        -------
+        (N,) float64
+            NaN where nothing stands.
+
+        Raises
+        ------
+        FormatError
+            If the file has the column twice, or a value is no number: then with its row.
+        """
         if any(other.startswith(name + _AGAIN) for other in self.names):
             raise self.error(None, f"want the column {name!r} once, got it again; name the columns apart")
         column = self.table[name]
@@ -94,7 +116,24 @@ class Columns:
         return pa.chunked_array([[None if v is None or v.strip() in _NOTHING else float(v) for v in values]])
 
     def texts(self, name: str) -> tuple[np.ndarray, list[str]]:
-        """Read a column of names as (N,) int64 numbers and the names they stand for, in order of appearance."""
+        """Read a column of names.
+
+        Parameters
+        ----------
+        name : one of the columns
+
+        Returns
+        -------
+        (N,) int64
+            Which of the names each row has.
+        list of str
+            The names in order of appearance, without spaces around them.
+
+        Raises
+        ------
+        FormatError
+            With the row where no name stands.
+        """
         column = self.table[name]
         if not (pa.types.is_string(column.type) or pa.types.is_dictionary(column.type)):
             column = pc.cast(column, pa.string())
@@ -110,7 +149,22 @@ class Columns:
         return np.asarray(encoded.indices.to_numpy(zero_copy_only=False), np.int64), names
 
     def flags(self, name: str) -> np.ndarray:
-        """Read a column of yes and no, (N,) bool."""
+        """Read a column of yes and no.
+
+        Parameters
+        ----------
+        name : one of the columns
+
+        Returns
+        -------
+        (N,) bool
+            False where nothing stands in a column of numbers or truths.
+
+        Raises
+        ------
+        FormatError
+            With the row that says neither.
+        """
         column = self.table[name]
         if pa.types.is_boolean(column.type):
             return np.asarray(column.fill_null(False).to_numpy(), bool)
@@ -131,6 +185,10 @@ class Columns:
 def header_of(data: bytes) -> tuple[str, list[str], int]:
     """Find the first line of a text that is no comment: its separator, its names in lower case, and its number from 1.
 
+    Parameters
+    ----------
+    data : bytes, UTF-8 with or without a byte-order mark; only the start of a file need be given
+
     Returns
     -------
     str, list of str, int
@@ -148,6 +206,16 @@ def header_of(data: bytes) -> tuple[str, list[str], int]:
 def read(path: Path | str, *, max_bytes: int = MAX_BYTES) -> Columns:
     """Read the columns of a Parquet or CSV file, told apart by content.
 
+    Parameters
+    ----------
+    path : file
+    max_bytes : int
+        A larger file is refused unread.
+
+    Returns
+    -------
+    Columns
+
     Raises
     ------
     FormatError
@@ -156,14 +224,7 @@ def read(path: Path | str, *, max_bytes: int = MAX_BYTES) -> Columns:
         If it cannot be opened.
     """
     path = Path(path)
-    size = path.stat().st_size
-    if size > max_bytes:
-        raise FormatError(
-            str(path),
-            0,
-            f"want at most {max_bytes / 1e6:.0f} MB, got {size / 1e6:.0f} MB; cut the recording into takes",
-        )
-    if size == 0:
+    if check_size(path, max_bytes=max_bytes) == 0:
         raise FormatError(str(path), 0, "want a recording, got an empty file; export it again")
     with path.open("rb") as file:
         start = file.read(4)
@@ -193,6 +254,16 @@ def _parquet(path: Path, name: str) -> Columns:
 
 def parse_csv(data: bytes, path: str = "") -> Columns:
     """Read the columns of a CSV: commas, semicolons (then with decimal commas allowed) or tabs; UTF-8 or UTF-16.
+
+    Parameters
+    ----------
+    data : bytes
+    path : str
+        Named in messages.
+
+    Returns
+    -------
+    Columns
 
     Raises
     ------
@@ -253,5 +324,17 @@ def _shown(data: bytes) -> str:
 
 
 def column(columns: Columns, *spellings: str) -> str | None:
-    """Name of the first spelling that the file has."""
+    """Find the first spelling that the file has.
+
+    Parameters
+    ----------
+    columns : Columns
+    spellings : str
+        In lower case, the best first.
+
+    Returns
+    -------
+    str or None
+        None where it has none of them.
+    """
     return next((name for name in spellings if name in columns.names), None)

@@ -49,7 +49,12 @@ class Suit:
 
 
 def is_long(names: list[str]) -> bool:
-    """Whether columns are meant for this form: a sensor, and any of a quaternion."""
+    """Whether columns are meant for this form: a sensor, and any of a quaternion.
+
+    Parameters
+    ----------
+    names : of the columns, in lower case
+    """
     return any(n in names for n in _SENSOR) and any(f.format(c) in names for f in _QUATERNION for c in "wxyz")
 
 
@@ -101,7 +106,7 @@ def parse(columns: Columns, own: dict[str, str] | None = None) -> Suit:
         line = timeline.timeline(at_s)
     except ValueError as error:
         raise columns.error(None, str(error)) from error
-    notes, more = notes_on_time(line, f)
+    notes, more = notes_on_time(line)
     position, turned, valid = timeline.onto_grid(line, at_s, position, turned, valid)
     return Suit(kept(line.rate_hz, sensors, position, turned, valid), first_frame, scale, notes, (*warnings, *more))
 
@@ -109,7 +114,26 @@ def parse(columns: Columns, own: dict[str, str] | None = None) -> Suit:
 def kept(
     rate_hz: float, sensors: tuple[str, ...], position: Float, turned: Float, valid: NDArray[np.bool_]
 ) -> Recording:
-    """Make a recording of the sensors that have a name."""
+    """Make a recording of the sensors that have a name.
+
+    Parameters
+    ----------
+    rate_hz : float, > 0
+    sensors : S names, "" for a sensor to leave out
+    position : (F, S, 3) float64, metres
+    turned : (F, S, 4) float64, ``wxyz``
+    valid : (F, S) bool
+
+    Returns
+    -------
+    Recording
+        Of the sensors with a name, in the same order.
+
+    Raises
+    ------
+    ValueError
+        As :class:`kernels.calibration.records.Recording`.
+    """
     k = [i for i, name in enumerate(sensors) if name]
     return Recording(rate_hz, tuple(sensors[i] for i in k), position[:, k], turned[:, k], valid[:, k])
 
@@ -192,17 +216,35 @@ def _once(columns: Columns, frame: Int, number: Int, sensors: tuple[str, ...]) -
         )
 
 
-def notes_on_time(line: timeline.Timeline, n_frames: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Say what was made of the times of a recording, and what is doubtful about them."""
+def notes_on_time(line: timeline.Timeline) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Say what was made of the times of a recording, and what is doubtful about them.
+
+    Parameters
+    ----------
+    line : the grid the samples were put on
+
+    Returns
+    -------
+    notes, warnings : one sentence each; none for an even stream without a gap
+    """
     if line.kind == "uneven":
         return (), (f"times are uneven; interpolated to {line.rate_hz:g} frames a second",)
     said = () if line.kind == "even" else (f"times come in bursts; samples counted at {line.rate_hz:g} a second",)
-    lost = line.n_places - n_frames
-    return said, (f"{lost} frames are missing from the times; they count as not heard",) if lost else ()
+    return said, (f"{line.n_lost} frames are missing from the times; they count as not heard",) if line.n_lost else ()
 
 
 def to_table(recording: Recording) -> pa.Table:
-    """Write a recording as the long form, one row a frame and sensor, frames in order."""
+    """Write a recording as the long form, one row a frame and sensor, frames in order.
+
+    Parameters
+    ----------
+    recording : Recording of F frames and S sensors
+
+    Returns
+    -------
+    pyarrow.Table
+        F S rows with the columns :data:`WANTED`: metres, seconds to the nanosecond, from frame 0.
+    """
     f, s = recording.is_valid.shape
     p, q = recording.position_xyz_m.reshape(-1, 3), recording.rotation_wxyz.reshape(-1, 4)
     frame = np.repeat(np.arange(f, dtype=np.int32), s)

@@ -33,7 +33,12 @@ _BODY = (("m", 0.5, 3.0), ("in", 20.0, 95.0), ("cm", 95.0, 320.0), ("mm", 500.0,
 
 
 def is_wide(names: list[str]) -> bool:
-    """Whether columns are meant for this form: a time, and a whole quaternion of one station."""
+    """Whether columns are meant for this form: a time, and a whole quaternion of one station.
+
+    Parameters
+    ----------
+    names : of the columns, in lower case
+    """
     return any(name in SECONDS for name in names) and any(len(axes) == 4 for axes in _stations(names, _TURNED).values())
 
 
@@ -88,7 +93,7 @@ def parse(columns: Columns, own: dict[str, str] | None = None, *, unit: str = "a
             line = timeline.timeline(at_s)
     except ValueError as error:
         raise columns.error(None, str(error)) from error
-    on_time, more = notes_on_time(line, len(rows))
+    on_time, more = notes_on_time(line)
     arrays = timeline.onto_grid(line, at_s, scale * placed[rows], turned[rows], valid[rows])
     return Suit(kept(line.rate_hz, sensors, *arrays), 0, scale, (*notes, *on_time), (*warnings, *more))
 

@@ -129,7 +129,25 @@ class HashCache:
             self._known = {}
 
     def sha256(self, root: Path, file: File, now_ns: int) -> str:
-        """Hash of ``root / file.path`` as of now."""
+        """Hash a file's bytes, or remember them.
+
+        Parameters
+        ----------
+        root : folder the file was listed under
+        file : as it was listed
+        now_ns : int
+            Time of the look at it, nanoseconds.
+
+        Returns
+        -------
+        str
+            Hexadecimal, 64 characters.
+
+        Raises
+        ------
+        OSError
+            If it has to be read and cannot be.
+        """
         entry = [file.size, file.modified_ns]
         known = self._known.get(f"{root.name}/{file.path}")
         if known is not None and known[:2] == entry and isinstance(known[2], str):

@@ -100,6 +100,14 @@ def joint_paths(skeleton: Skeleton) -> list[str]:
     """Joint paths as UsdSkel wants them, parents first: ``hips``, ``hips/spine``.
 
     Names that are no ASCII identifiers get one: other signs become ``_``, and a number tells equal ones apart.
+
+    Parameters
+    ----------
+    skeleton : Skeleton of J joints
+
+    Returns
+    -------
+    list of J texts, no two alike
     """
     taken: set[str] = set()
     paths: list[str] = []
@@ -181,7 +189,14 @@ def write_samples(
 
 
 def write_metadata(stage: Usd.Stage, clip: Clip) -> None:
-    """Write axis, unit, rate and range."""
+    """Write axis, unit, rate and range.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    clip : Clip of F >= 1 frames
+        Its rate becomes the stage's; time codes go from 0 to F - 1.
+    """
     UsdGeom.SetStageUpAxis(stage, contract.UP_AXIS)
     UsdGeom.SetStageMetersPerUnit(stage, contract.METERS_PER_UNIT)
     stage.SetTimeCodesPerSecond(clip.frame_rate_hz)
@@ -198,7 +213,20 @@ def _write_root(stage: Usd.Stage, clip: Clip, provenance: Mapping[str, object], 
 
 
 def tell_root(stage: Usd.Stage, prim: Usd.Prim, provenance: Mapping[str, object], title: str) -> None:
-    """Make a prim the one a stage is about, and write down where the dance came from."""
+    """Make a prim the one a stage is about, and write down where the dance came from.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    prim : its prim
+    provenance : as for :func:`write_stage`; nothing is written for an empty one
+    title : name in assetInfo
+
+    Raises
+    ------
+    ValueError
+        If the provenance holds what JSON cannot, or an absolute path.
+    """
     stage.SetDefaultPrim(prim)
     Usd.ModelAPI(prim).SetKind(Kind.Tokens.component)
     Usd.ModelAPI(prim).SetAssetName(title)
@@ -283,7 +311,18 @@ def _write_extent(stage: Usd.Stage, clip: Clip, shape: Body) -> None:
 
 
 def write_audio(stage: Usd.Stage, audio: str) -> None:
-    """Define the song. It starts with the stage: no startTime, since one importer refuses it."""
+    """Define the song. It starts with the stage: no startTime, since one importer refuses it.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    audio : path of a WAV relative to the stage, with ``/``; the file is not looked at
+
+    Raises
+    ------
+    ValueError
+        If the path is absolute or not that of a WAV.
+    """
     relative = PurePosixPath(audio)
     if usd_read.is_absolute(audio) or relative.suffix.lower() != contract.PACKAGE_AUDIO_SUFFIX:
         raise ValueError(f"audio: want a relative path of a WAV file, got {audio!r}")
@@ -344,6 +383,11 @@ def written_beside(path: Path) -> Iterator[Path]:
 
 def save(layer: Sdf.Layer, path: Path) -> None:
     """Write a layer in the format of the suffix.
+
+    Parameters
+    ----------
+    layer : Sdf.Layer
+    path : with a suffix of USD
 
     Raises
     ------

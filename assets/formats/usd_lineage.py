@@ -50,7 +50,12 @@ def write_lineage(layer: Sdf.Layer, animation: str, frames: Frames) -> None:
 
 
 def animation_with_lineage(stage: Usd.Stage) -> Usd.Prim | None:
-    """Find the first prim of a stage that says where its frames come from; None where there is none."""
+    """Find the first prim of a stage that says where its frames come from; None where there is none.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+    """
     return next((prim for prim in stage.Traverse() if prim.GetAttribute("odori:clip").HasAuthoredValue()), None)
 
 

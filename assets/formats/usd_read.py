@@ -63,6 +63,10 @@ def read_animation(path: str | Path) -> Clip:
 def read_provenance(path: str | Path) -> dict[str, object]:
     """Read the provenance of a stage, {} where there is none; lists come back as lists.
 
+    Parameters
+    ----------
+    path : of a stage
+
     Raises
     ------
     FormatError
@@ -76,6 +80,10 @@ def read_provenance(path: str | Path) -> dict[str, object]:
 
 def open_stage(path: str | Path) -> Usd.Stage:
     """Open a stage, whatever the file is.
+
+    Parameters
+    ----------
+    path : str or Path
 
     Raises
     ------
@@ -93,7 +101,17 @@ def open_stage(path: str | Path) -> Usd.Stage:
 
 
 def animated_skeleton(stage: Usd.Stage) -> UsdSkel.SkeletonQuery | None:
-    """Find the first skeleton under a SkelRoot whose animation can be asked."""
+    """Find the first skeleton under a SkelRoot whose animation can be asked.
+
+    Parameters
+    ----------
+    stage : Usd.Stage
+
+    Returns
+    -------
+    UsdSkel.SkeletonQuery or None
+        None where no skeleton is animated.
+    """
     cache = UsdSkel.Cache()
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if not prim.IsA(UsdSkel.Root):
@@ -134,6 +152,16 @@ def _from_usd(value: object) -> object:
 
 
 def reason(error: Exception) -> str:
-    """Return the first thing USD says, without where in USD it says it."""
+    """Return the first thing USD says, without where in USD it says it.
+
+    Parameters
+    ----------
+    error : of USD
+
+    Returns
+    -------
+    str
+        One line; ``no reason given`` for an error without a word.
+    """
     first = next((line for line in str(error).splitlines() if line.strip()), "no reason given")
     return first.split(" : ", 1)[-1].strip().strip("'")

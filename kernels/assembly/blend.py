@@ -10,7 +10,9 @@ import scipy
 
 from kernels import rotation
 from kernels.assembly.joins import PROBE_S, SHAPES, Side, ease
+from kernels.assembly.stance import clip_contacts, meet, planted_share
 from kernels.assembly.timing import clock
+from kernels.motion.contacts import FootContacts
 from kernels.skeleton import kinematics
 from kernels.types import Choreography, Clip, Float, Int, Skeleton
 
@@ -114,6 +116,18 @@ def _lowest_m(skeleton: Skeleton, root_xyz_m: Float, rotation_wxyz: Float) -> Fl
     return np.asarray(position[:, feet or slice(None), 1].min(axis=1), np.float64)
 
 
+def _planted_through(
+    steps: Choreography, clips: Mapping[str, Clip], standing: Mapping[str, FootContacts], seam: int
+) -> Float:
+    """Share of half a blend for which each point of the feet is planted in both clips, (2, 2)."""
+    half_s = steps.blend_s[seam] / 2
+    before, after = steps.clip_id[seam - 1], steps.clip_id[seam]
+    end_s, start_s = float(steps.clip_end_s[seam - 1]), float(steps.clip_start_s[seam])
+    return planted_share(standing[before], end_s - half_s, end_s, clips[before].frame_rate_hz) * planted_share(
+        standing[after], start_s, start_s + half_s, clips[after].frame_rate_hz
+    )
+
+
 def assemble(
     steps: Choreography,
     clips: Mapping[str, Clip],
@@ -127,7 +141,8 @@ def assemble(
 
     Between the boundaries of steps the clips are played by the clock of :mod:`kernels.assembly.timing`, so every
     boundary falls on its song time. At a seam the following clip is turned and moved so that its root stands where the
-    one before stood and faces where it faced; over the blend both are played at the same pace and joined by ``shape``.
+    one before stood and faces where it faced, and then so that feet planted in both clips stand where they stood
+    (:mod:`kernels.assembly.stance`); over the blend both are played at the same pace and joined by ``shape``.
     The dance starts at the origin, facing +Z.
 
     After JP5778523B2, equations 21, 22 and 27; centred blends, blended root travel, feet kept at their height through a
@@ -137,7 +152,7 @@ def assemble(
     ----------
     steps : Choreography of at least one step, from song time 0
     clips : by clip_id, all on ``skeleton``
-    skeleton : Skeleton of J joints
+    skeleton : Skeleton of the canonical joints
     frame_rate_hz : float, > 0
     duration_s : float, seconds, > 0
     shape : name of one of :data:`kernels.assembly.joins.SHAPES`
@@ -173,6 +188,7 @@ def assemble(
     clip_time, partner_time = np.zeros(n_frames), np.full(n_frames, np.nan)
     partner, weight = np.full(n_frames, -1), np.zeros(n_frames)
     place, heading = np.zeros(3), 0.0
+    standing = {name: clip_contacts(clips[name], kinematics.place(clips[name])[0]) for name in set(steps.clip_id)}
     probe = np.array([-PROBE_S, 0.0, PROBE_S])
     edge_root, edge_rot = np.zeros((3, 3)), np.zeros((3, n_joints, 4))
     for a, b in zip(start, end, strict=True):
@@ -193,6 +209,14 @@ def assemble(
         xyz, q = turn(xyz, q, angle)
         shift = (place - xyz[-5]) * np.array([1.0, 0.0, 1.0])
         xyz = xyz + shift
+        if a:
+            before_xyz_m, after_xyz_m = (
+                kinematics.forward(skeleton, r, j)[0][1] for r, j in ((edge_root, edge_rot), (xyz[-6:-3], q[-6:-3]))
+            )
+            planted = _planted_through(steps, clips, standing, int(a))
+            angle, shift = meet(before_xyz_m, after_xyz_m, planted, heading_rad=heading)
+            xyz, q = turn(xyz, q, angle)
+            xyz = xyz + shift
         place, heading = xyz[-2], float(rotation.heading_rad(q[-2, 0]))
         entry_root, entry_rot = xyz[-6:-3], q[-6:-3]
         next_root, next_rot = xyz[-3:], q[-3:]

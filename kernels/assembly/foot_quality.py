@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.assembly.blend import Dance
-from kernels.assembly.feet import clip_contacts, planted_feet
+from kernels.assembly.feet import planted_feet
 from kernels.assembly.quality import Measure
 from kernels.assembly.seam_quality import phrases_alone
+from kernels.assembly.stance import clip_contacts
 from kernels.motion import contacts
 from kernels.motion.contacts import FootContacts
 from kernels.skeleton import grounding, kinematics
@@ -22,6 +23,10 @@ Bool = NDArray[np.bool_]
 
 UNSEEN_SLIDE_CM_PER_S = 0.5
 """Slide of planted feet that nobody sees, whatever the clips do: a twentieth of what captured clips have."""
+
+
+UNSEEN_KNEE_RAD_PER_S2 = 6.0
+"""Change of a knee's turning that nobody sees, however still the clips stand: of a degree to and fro at 3 Hz."""
 
 
 def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
@@ -72,7 +77,7 @@ def foot_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) 
 
 
 def knee_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
-    """Judge the knees: a leg that is pulled straight for a foot pops.
+    """Judge the knees: a leg that is pulled straight for a foot pops. Knees at rest count as wavering a little.
 
     Parameters
     ----------
@@ -86,9 +91,32 @@ def knee_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) 
     """
     own = [_knee_turns(position) for _, position in phrases_alone(dance, steps, clips, skeleton=CANONICAL)]
     ours = _knee_turns(dance.position_xyz_m)
-    source = float(np.percentile(np.concatenate(own), 99.9)) if own else 0.0
+    unseen = UNSEEN_KNEE_RAD_PER_S2 / dance.frame_rate_hz**2
+    source = max(float(np.percentile(np.concatenate(own), 99.9)), unseen) if own else 0.0
     ratio = float(np.percentile(ours, 99.9)) / source if source > 0 and len(ours) else 0.0
     return [Measure("knee_pop_ratio", ratio, "at most 1.2", ratio <= 1.2)]
+
+
+def slip_measures(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
+    """Judge the feet that are planted through a seam by :func:`seam_slips`.
+
+    Parameters
+    ----------
+    dance, steps, clips : as :func:`kernels.assembly.blend.assemble` has them, on the canonical skeleton
+
+    Returns
+    -------
+    list of Measure
+        How many, and in centimetres the 95th percentile (an actual foot: the worst of up to twenty) and the worst;
+        zeros where none is.
+    """
+    slip_cm = 100 * seam_slips(dance, steps, planted_feet(dance, steps, clips))
+    high = float(np.percentile(slip_cm, 95, method="higher")) if len(slip_cm) else 0.0
+    return [
+        Measure("seam_planted_count", float(len(slip_cm))),
+        Measure("seam_foot_slip_cm", high, "at most 1", high <= 1.0),
+        Measure("seam_foot_slip_worst_cm", float(slip_cm.max(initial=0.0))),
+    ]
 
 
 def seam_slips(dance: Dance, steps: Choreography, planted: FootContacts) -> Float:

@@ -14,6 +14,9 @@ from kernels.motion.velocity import jerk
 from kernels.skeleton import kinematics
 from kernels.types import Choreography, Clip, Float, Int, Skeleton
 
+UNSEEN_JERK_M_PER_S3 = 30.0
+"""Jerk that nobody sees, however still the clips stand: of half a centimetre to and fro three times a second."""
+
 
 def seam_ratios(
     dance: Dance, steps: Choreography, clips: Mapping[str, Clip], *, skeleton: Skeleton, reach_s: float = 0.1
@@ -48,6 +51,8 @@ def peak_ratios(
 ) -> Float:
     """Peak jerk near each seam over the 99th percentile inside the source clips at the dance's own pace.
 
+    Clips that stand still count as :data:`UNSEEN_JERK_M_PER_S3`.
+
     Parameters
     ----------
     dance, steps, clips, skeleton : as :func:`kernels.assembly.blend.assemble` has them
@@ -60,7 +65,7 @@ def peak_ratios(
     at_s = steps.song_start_s[steps.has_seam]
     if len(at_s) == 0 or len(dance.time_s) < 4:
         return np.zeros(0)
-    reference = float(np.percentile(_source_jerk(dance, steps, clips, skeleton), 99)) or 1.0
+    reference = max(float(np.percentile(_source_jerk(dance, steps, clips, skeleton), 99)), UNSEEN_JERK_M_PER_S3)
     found = jerk(dance.position_xyz_m, dance.frame_rate_hz)
     return _peaks(found, dance.time_s, at_s, np.broadcast_to(reach_s, at_s.shape)) / reference
 

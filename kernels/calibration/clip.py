@@ -91,6 +91,11 @@ def to_clip(poses: Poses, frame_rate_hz: float, *, gauge: Gauge | None = None) -
     Clip
         Metres, Y up. Joints are named after the suit's segments; the ends of head, hands and feet, which no sensor
         shows, lie where an average body has them.
+
+    Raises
+    ------
+    ValueError
+        If there is no frame, or the rate is not > 0.
     """
     gauge = find_gauge(poses, frame_rate_hz) if gauge is None else gauge
     world = rotation.mul(gauge.up_wxyz, poses.rotation_wxyz)

@@ -207,11 +207,6 @@ class Calibration:
         """Joints in the frames of their own sensors, (16, 3)."""
         return np.stack([joint.in_child_sensor_m for joint in self.joints])
 
-    @property
-    def has_errors(self) -> bool:
-        """Whether a finding is an error."""
-        return any(finding.severity == "error" for finding in self.findings)
-
 
 @dataclass(frozen=True, eq=False)
 class Poses:

@@ -39,6 +39,11 @@ class PathCosts:
         A transition costs ``jump_back`` more when it goes back in its own clip by at most the window, in seconds.
     usage : float, >= 0
         Showing a stretch between two motion beats for the n-th time costs ``usage · (n − 1)``.
+    stay : float, >= 0
+        A transition r music beats after the one before it costs ``stay · (M − r) / M`` more where r < M: a phrase cut
+        short. The song's start and end are no transitions.
+    stay_beats : int, >= 1
+        M, beats of the music after which a stay is long enough; 1 for no price.
     missed_beat : float, >= 0
         A step over d music beats that ends on a node of accent a costs ``missed_beat · (d − a)``: each music beat on
         which the body does not visibly stop. Nothing where the graph's accents are not known.
@@ -63,6 +68,8 @@ class PathCosts:
     jump_back: float = 1.0
     jump_back_window_s: float = 8.0
     usage: float = 0.5
+    stay: float = 0.0
+    stay_beats: int = 4
     missed_beat: float = 2.0
 
     def __post_init__(self) -> None:
@@ -70,6 +77,8 @@ class PathCosts:
             value = getattr(self, field.name)
             if isinstance(value, float | int) and not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{field.name}: want finite, >= 0, got {value}")
+        if self.stay_beats < 1:
+            raise ValueError(f"stay_beats: want >= 1, got {self.stay_beats}")
         if self.transition_scale == 0:
             raise ValueError("transition_scale: want > 0, got 0")
         (a, b), (c, d), (e, f) = self.last_resort_ratio, self.hard_ratio, self.soft_ratio
@@ -147,10 +156,25 @@ def transition_cost(graph: MotionGraph, costs: PathCosts) -> Float:
     -------
     (E,) float64, >= 0; empty without transitions
     """
-    scale = costs.transition_scale
-    if scale is None:
-        scale = float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0
-    return np.asarray(costs.seam + costs.transition * graph.weight / (scale if scale > 0 else 1.0), np.float64)
+    return np.asarray(costs.seam + costs.transition * graph.weight / weight_scale(graph, costs), np.float64)
+
+
+def weight_scale(graph: MotionGraph, costs: PathCosts) -> float:
+    """Give the weight of a poor seam.
+
+    Parameters
+    ----------
+    graph : MotionGraph
+    costs : PathCosts
+
+    Returns
+    -------
+    float, > 0
+        The costs' own, else the 95th percentile of the graph's; 1 where there are no transitions, or that is 0.
+    """
+    if costs.transition_scale is not None:
+        return costs.transition_scale
+    return (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
 
 
 def rough_cost(graph: MotionGraph, costs: PathCosts) -> Float:
@@ -198,6 +222,21 @@ def intensity_price(music: Float, graph: MotionGraph, *, weight: float) -> Float
         return np.zeros((len(music), len(graph.clip_index)))
     ranks = [(mean_ranks(values) - 0.5) / len(values) for values in (music, graph.speed)]
     return np.asarray(weight * np.subtract.outer(*ranks) ** 2, np.float64)
+
+
+def hurry_cost(costs: PathCosts) -> Float:
+    """Price of a transition by the music beats since the one before: 1, 2, … M, the last free.
+
+    Parameters
+    ----------
+    costs : PathCosts
+
+    Returns
+    -------
+    (M,) float64, ``stay · (M − r) / M``; one zero where stays have no price
+    """
+    most = costs.stay_beats if costs.stay else 1
+    return np.asarray(costs.stay * (most - np.arange(1, most + 1)) / most, np.float64)
 
 
 def jump_back_cost(graph: MotionGraph, costs: PathCosts) -> Float:

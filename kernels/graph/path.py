@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.costs import PathCosts, is_within, rough_cost, usage_cost, warp_cost
-from kernels.graph.program import Move, Program
+from kernels.graph.costs import PathCosts, is_within, rough_cost, usage_cost, warp_cost, weight_scale
+from kernels.graph.program import Move, Program, StepPrice
 from kernels.graph.repetition import spread
 from kernels.types import Choreography, Float, Int, MotionGraph
 
@@ -52,7 +52,8 @@ class Path:
     beat_span, motion_span : (S,) int64, >= 1, music and motion beats it covers
     has_transition : (S,) bool
         Whether it does not start where the step before ended.
-    transition_cost, warp_cost, repetition_cost, stride_cost, beat_cost, diversity_cost, wish_cost : (S,) float64, >= 0
+    transition_cost, stay_cost, warp_cost, repetition_cost, stride_cost, beat_cost, diversity_cost, wish_cost :
+        (S,) float64, >= 0
     warp_ratio : (S,) float64, song time ÷ clip time
     is_outside : (S,) bool, whether the ratio leaves the hard bounds
     """
@@ -64,6 +65,7 @@ class Path:
     motion_span: Int
     has_transition: Mask
     transition_cost: Float
+    stay_cost: Float
     warp_cost: Float
     repetition_cost: Float
     stride_cost: Float
@@ -78,6 +80,7 @@ class Path:
         """Sum of all components over all steps."""
         parts = (
             self.transition_cost,
+            self.stay_cost,
             self.warp_cost,
             self.repetition_cost,
             self.stride_cost,
@@ -100,6 +103,7 @@ def find_path(
     strict: bool = False,
     stretch_price: Float | None = None,
     interval_price: Float | None = None,
+    step_price: StepPrice | None = None,
 ) -> Path:
     """Find the cheapest dance for a song.
 
@@ -121,6 +125,8 @@ def find_path(
         Price of dancing from a node to the next, each time: what makes a second dance differ from a first.
     interval_price : (K, N) float, >= 0, or None
         Price of dancing music interval k with a step that starts at the node: soft wishes.
+    step_price : StepPrice or None
+        Price of single steps, by music beat and kind; infinite forbids.
 
     Returns
     -------
@@ -136,10 +142,11 @@ def find_path(
 
     Notes
     -----
-    *Program* (:mod:`kernels.graph.program`): exact, all starts at once, K · (N · |steps| + E) operations. It runs from
-    the last beat backwards, so that only nodes from which the last beat can still be reached ever have a cost: this
-    loses fewer clips than pruning the graph to its strongly connected part, which forbids one-way streets even where
-    the song ends before they do. Ties: no transition before any, then the lower clip and node, then the earlier kind.
+    *Program* (:mod:`kernels.graph.program`): exact, all starts at once, K · (M · N · |steps| + E) operations with M
+    beats of a stay that is long enough, K · (M + 1) · N numbers kept. It runs from the last beat backwards, so that
+    only nodes from which the last beat can still be reached ever have a cost: this loses fewer clips than pruning it
+    to its strongly connected part, which forbids one-way streets even where the song ends before they do. Ties: no
+    transition before any, then the lower clip and node, then the earlier kind.
 
     *Hard bounds.* Steps outside them are considered only when no dance stays inside; then the fewest possible are
     used, before any other cost counts, and ``is_outside`` tells which. Outside the last-resort bounds never.
@@ -168,7 +175,13 @@ def find_path(
     if n_beats == 0:
         return _evaluate(None, [], costs, graph)
     most = more_than_any(
-        graph, beat_s, costs=costs, steps=steps, stretch_price=stretch_price, interval_price=interval_price
+        graph,
+        beat_s,
+        costs=costs,
+        steps=steps,
+        stretch_price=stretch_price,
+        interval_price=interval_price,
+        step_price=step_price,
     )
     for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
         program = Program(
@@ -181,9 +194,10 @@ def find_path(
             outside_price=price,
             stretch_price=stretch_price,
             interval_price=interval_price,
+            step_price=step_price,
         )
-        whole = program.solve(0, n_beats, after={n_beats: np.zeros(n_nodes)})
-        if len(start) and np.isfinite(whole.start[0][start]).any():
+        whole = program.solve(0, n_beats, after={n_beats: program.at_the_end})
+        if len(start) and np.isfinite(whole.begin[start]).any():
             moves = program.decode(whole, first=0, last=n_beats, arrived=None, starts=start)
 
             def total(candidate: list[Move], program: Program = program) -> float:
@@ -250,12 +264,13 @@ def more_than_any(
     steps: tuple[tuple[int, int], ...] = STEPS,
     stretch_price: Float | None = None,
     interval_price: Float | None = None,
+    step_price: StepPrice | None = None,
 ) -> float:
     """Price a step outside the hard bounds: more than any path can cost, repetition included.
 
     Parameters
     ----------
-    graph, beat_s, costs, steps, stretch_price, interval_price : as :func:`find_path` has them
+    graph, beat_s, costs, steps, stretch_price, interval_price, step_price : as :func:`find_path` has them
 
     Returns
     -------
@@ -266,15 +281,18 @@ def more_than_any(
     warp = float(warp_cost(np.array(costs.last_resort_ratio), costs).max())
     stride = max(costs.stride * abs(float(np.log2(m / d))) for m, d in steps)
     largest = float(graph.weight.max(initial=0.0))
-    scale = costs.transition_scale or (float(np.percentile(graph.weight, 95)) if len(graph.weight) else 1.0) or 1.0
     roughest = float(rough_cost(graph, costs).max(initial=0.0))
-    seam = costs.seam + costs.transition * largest / scale + roughest + costs.jump_back
+    seam = (
+        costs.seam + costs.transition * largest / weight_scale(graph, costs) + roughest + costs.jump_back + costs.stay
+    )
     missed = costs.missed_beat * max(d for _, d in steps)
     most = 1.0 + n_beats * (warp + stride + seam + missed + longest * costs.usage * n_beats * longest)
     if stretch_price is not None and stretch_price.size:
         most += n_beats * longest * float(stretch_price.max())
     if interval_price is not None and interval_price.size:
         most += n_beats * float(interval_price.max())
+    for price in (step_price or {}).values():
+        most += float(price[np.isfinite(price)].max(initial=0.0))
     return most
 
 
@@ -284,13 +302,15 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     if program is None or not moves:
         none, no = np.zeros(0, np.int64), np.zeros(0, bool)
         zero = np.zeros(0)
-        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, zero, zero, no)
+        return Path(none, none, none, none, none, no, zero, zero, zero, zero, zero, zero, zero, zero, zero, no)
     span = np.array([d for _, d in program.steps])[kind]
     end = np.array([program.end[k][u] for _, u, k in moves], np.int64)
     seams = np.append(False, source[1:] != end[:-1])
     edge = np.array([program.edge(v, u) for v, u in zip(end[:-1][seams[1:]], source[seams], strict=True)], np.int64)
     transition, repetition = np.zeros(len(moves)), np.zeros(len(moves))
     transition[seams], repetition[seams] = program.seam[edge], program.jump_back[edge]
+    stay, at = np.zeros(len(moves)), beat[seams]
+    stay[np.flatnonzero(seams)[1:]] = program.hurry[np.minimum(np.diff(at), program.long_enough) - 1]
     shown, shown_by = program.stretches(moves)
     np.add.at(repetition, shown_by, usage_cost(shown, program.n_nodes, costs))
     diversity = np.zeros(len(moves))
@@ -305,12 +325,13 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
         motion_span=np.array([m for m, _ in program.steps])[kind],
         has_transition=seams,
         transition_cost=transition,
+        stay_cost=stay,
         warp_cost=warp_cost(ratio, costs),
         repetition_cost=repetition,
         stride_cost=stride,
         beat_cost=np.array([program.missed[k][u] for _, u, k in moves]),
         diversity_cost=diversity,
-        wish_cost=np.array([program.interval_cost(k, i, np.array([u]))[0] for k, u, i in moves]),
+        wish_cost=np.array([program.wish_cost(k, i, np.array([u]))[0] for k, u, i in moves]),
         warp_ratio=ratio,
         is_outside=~is_within(ratio, costs.hard_ratio),
     )

@@ -10,8 +10,8 @@ costs more.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Protocol
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from kernels.graph.costs import PathCosts
 from kernels.graph.path import STEPS
-from kernels.graph.program import Program
+from kernels.graph.program import Program, StepPrice
 from kernels.types import Float, Int, MotionGraph
 
 Mask = NDArray[np.bool_]
@@ -38,6 +38,9 @@ class Pin:
     name : how a person calls it
     first, last : int, music intervals first <= k < last
     nodes : (N,) bool, where a step in those intervals may start
+    steps : StepPrice
+        What single steps pay for keeping the pin; infinite where they would not keep it.
+    steps_at : the same for a pin that begins on another beat, or None where there is none
 
     Raises
     ------
@@ -49,10 +52,29 @@ class Pin:
     first: int
     last: int
     nodes: Mask
+    steps: StepPrice = field(default_factory=dict)
+    steps_at: Callable[[int], StepPrice] | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.first < self.last:
             raise ValueError(f"{self.name}: want 0 <= first < last music interval, got {self.first} to {self.last}")
+
+    def moved(self, beats: int) -> Pin:
+        """Give the same wish some beats later."""
+        first = self.first + beats
+        steps = self.steps if self.steps_at is None else self.steps_at(first)
+        return replace(self, first=first, last=self.last + beats, steps=steps)
+
+    def sources(self, interval: int) -> Mask:
+        """Nodes that a step which covers a music interval may start from, (N,) bool."""
+        here = [
+            np.isfinite(price) for (beat, kind), price in self.steps.items() if beat <= interval < beat + STEPS[kind][1]
+        ]
+        return self.nodes & np.any(here, axis=0) if here else self.nodes
+
+    def instead(self, nodes: Mask) -> Pin:
+        """Wish for steps from these nodes in the same place."""
+        return replace(self, nodes=nodes, steps={}, steps_at=None)
 
 
 @dataclass(frozen=True)
@@ -130,6 +152,15 @@ class Danceable(Protocol):
         ...
 
 
+def step_price(pins: Sequence[Pin]) -> StepPrice:
+    """Sum what single steps pay for pins."""
+    found: dict[tuple[int, int], Float] = {}
+    for pin in pins:
+        for place, price in pin.steps.items():
+            found[place] = found[place] + price if place in found else price
+    return found
+
+
 class Reach:
     """Whether a dance of a song can keep pins: the reachability part of the path's program, asked many times.
 
@@ -181,7 +212,7 @@ class Reach:
 
     def arrivals(self, pins: Sequence[Pin]) -> Mask:
         """Nodes where a step may have ended by each beat, keeping the pins until then: (K + 1, N) bool."""
-        mask = admitted(pins, self.n_intervals, self.n_nodes)
+        mask, price = admitted(pins, self.n_intervals, self.n_nodes), step_price(pins)
         arrived = np.zeros((self.n_intervals + 1, self.n_nodes), bool)
         for beat, fits in enumerate(self._fits):
             ready = arrived[beat].copy()
@@ -190,9 +221,11 @@ class Reach:
                 ready[self._starts] = True
             if not ready.any():
                 continue
-            for (_, span), end, fit in zip(self._steps, self._end, fits, strict=True):
+            for kind, ((_, span), end, fit) in enumerate(zip(self._steps, self._end, fits, strict=True)):
                 if fit is not None:
                     can = ready & fit & mask[beat : beat + span].all(axis=0)
+                    if (beat, kind) in price:
+                        can &= np.isfinite(price[beat, kind])
                     arrived[beat + span][end[can]] = True
         return arrived
 
@@ -201,8 +234,10 @@ class Reach:
         for k in range(pin.first, pin.last):
             covered = False
             for start in range(max(k - max(d for _, d in self._steps) + 1, 0), k + 1):
-                for (_, span), fit in zip(self._steps, self._fits[start], strict=True):
-                    covered |= fit is not None and start + span > k and bool((fit & pin.nodes).any())
+                for kind, ((_, span), fit) in enumerate(zip(self._steps, self._fits[start], strict=True)):
+                    if fit is not None and start + span > k:
+                        is_shown = np.isfinite(pin.steps[start, kind]) if (start, kind) in pin.steps else True
+                        covered |= bool((fit & pin.nodes & is_shown).any())
             if not covered:
                 return False
         return True
@@ -253,7 +288,8 @@ def find_conflict(
 def _reason(reach: Danceable, pins: Sequence[Pin]) -> str:
     if len(pins) > 1:
         meet = range(max(pin.first for pin in pins), min(pin.last for pin in pins))
-        return "same_time" if meet and not np.all([pin.nodes for pin in pins], axis=0).any() else "path"
+        is_empty = any(not np.all([pin.sources(k) for pin in pins], axis=0).any() for k in meet)
+        return "same_time" if is_empty else "path"
     if not pins[0].nodes.any():
         return "nothing"
     return "start" if reach.fits(pins[0]) else "tempo"
@@ -273,12 +309,12 @@ def _ways_out(
             for shift in sorted(range(-FURTHEST_SHIFT, FURTHEST_SHIFT + 1), key=lambda n: (abs(n), n)):
                 first, last = pin.first + shift, pin.last + shift
                 inside = shift and first >= 0 and last <= reach.n_intervals
-                if inside and reach.keeps([*rest, replace(pin, first=first, last=last)]):
+                if inside and reach.keeps([*rest, pin.moved(shift)]):
                     found.append(WayOut(index, shift, ""))
                     break
         for name, nodes in (choices[index] if choices else {}).items():
             differs = not np.array_equal(nodes, pin.nodes)
-            if differs and reach.keeps([*rest, replace(pin, nodes=nodes)]):
+            if differs and reach.keeps([*rest, pin.instead(nodes)]):
                 found.append(WayOut(index, 0, name))
                 break
     return tuple(sorted(found, key=lambda way: (way.choice != "", abs(way.shift_beats), way.pin_index)))

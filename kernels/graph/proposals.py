@@ -35,17 +35,16 @@ class Proposals:
     def __init__(self, program: Program, starts: Int) -> None:
         self._program, self._starts = program, starts
         n = program.n_beats
-        self._whole: Solution = program.solve(0, n, after={n: np.zeros(program.n_nodes)})
+        self._whole: Solution = program.solve(0, n, after={n: program.at_the_end})
         self._extra = program.stretch_price(None)
         self._source, self._target, self._edge_cost = program.transitions
         self._ready: list[Float] = []
-        self._arrived = [np.full(program.n_nodes, np.inf) for _ in range(n + 1)]
+        self._arrived: dict[int, Float] = {}
 
     @property
     def best_cost(self) -> float:
         """Cost of the cheapest dance; infinite where there is none."""
-        start = self._whole.start.get(0)
-        return float(start[self._starts].min(initial=np.inf)) if start is not None else np.inf
+        return float(self._whole.begin[self._starts].min(initial=np.inf))
 
     def through(self, interval: int, nodes: Mask | None = None) -> Float:
         """Cost of the cheapest dance for each step that could cover a music interval.
@@ -67,10 +66,12 @@ class Proposals:
             If the interval is not in the song.
         """
         self._check(interval, interval + 1)
-        through = np.full(self._program.n_nodes, np.inf)
+        program = self._program
+        through = np.full(program.n_nodes, np.inf)
         for beat, kind, span in self._covering(interval):
             arrive = self._whole.arrive[beat + span]
-            np.minimum(through, self._forward(beat) + self._step(beat, kind, arrive), out=through)
+            total = self._forward(beat) + program.step_total(beat, kind, arrive, self._extra)
+            np.minimum(through, total.min(axis=0), out=through)
         return through if nodes is None else np.where(nodes, through, np.inf)
 
     def within(self, first: int, last: int, nodes: Mask) -> float:
@@ -98,15 +99,11 @@ class Proposals:
         program = self._program
         arrive: dict[int, Float] = {k: self._whole.arrive[k] for k in range(last, program.n_beats + 1)}
         for beat in range(last - 1, first, -1):
-            start = np.full(program.n_nodes, np.inf)
-            for kind, (_, span) in enumerate(program.steps):
-                if beat + span in arrive:
-                    np.minimum(start, self._step(beat, kind, arrive[beat + span]), out=start)
-            arrive[beat] = program.relax(np.where(nodes, start, np.inf))
+            arrive[beat] = program.relax(np.where(nodes, program.start_costs(beat, arrive, self._extra), np.inf))
         best = np.inf
         for beat, kind, span in self._covering(first):
-            total = self._forward(beat) + self._step(beat, kind, arrive[beat + span])
-            best = min(best, float(total[nodes].min(initial=np.inf)))
+            total = self._forward(beat) + program.step_total(beat, kind, arrive[beat + span], self._extra)
+            best = min(best, float(total[:, nodes].min(initial=np.inf)))
         return best
 
     def _check(self, first: int, last: int) -> None:
@@ -123,31 +120,28 @@ class Proposals:
                     found.append((beat, kind, span))
         return found
 
-    def _step(self, beat: int, kind: int, arrive: Float) -> Float:
-        """Cost to go of a kind of step at a beat, by the node where it starts."""
-        cost = self._program.step_cost(beat, kind)
-        if cost is None:
-            return np.full(self._program.n_nodes, np.inf)
-        end = self._program.end[kind]
-        return np.where(end >= 0, cost + self._extra[kind] + arrive[end], np.inf)
-
     def _forward(self, beat: int) -> Float:
-        """Cost so far of being ready to start a step at a beat, by node; made as far as it is asked for."""
+        """Cost so far of being ready to start a step at a beat, (M + 1, N) by the beats of stay; made on demand."""
         program = self._program
+        most = program.long_enough
         while len(self._ready) <= beat:
             at = len(self._ready)
-            ready = self._arrived[at].copy()
+            arrived = self._arrived.pop(at, np.full((most, program.n_nodes), np.inf))
+            ready = np.vstack([np.full((1, program.n_nodes), np.inf), arrived])
             if at == 0:
-                ready[self._starts] = 0.0
+                ready[most, self._starts] = 0.0
             elif len(self._source):
-                np.minimum.at(ready, self._target, self._arrived[at][self._source] + self._edge_cost)
+                left = (arrived + program.hurry[:, None]).min(axis=0)
+                np.minimum.at(ready[0], self._target, left[self._source] + self._edge_cost)
             self._ready.append(ready)
             for kind, (_, span) in enumerate(program.steps):
                 cost = program.step_cost(at, kind)
                 if cost is None:
                     continue
-                end = program.end[kind]
-                goes = np.flatnonzero((end >= 0) & np.isfinite(cost) & np.isfinite(ready))
-                total = ready[goes] + cost[goes] + self._extra[kind][goes]
-                np.minimum.at(self._arrived[at + span], end[goes], total)
+                goes = np.flatnonzero(np.isfinite(cost) & np.isfinite(ready.min(axis=0)))
+                total = ready[:, goes] + (cost + self._extra[kind])[goes]
+                ends = program.end[kind][goes]
+                here = self._arrived.setdefault(at + span, np.full((most, program.n_nodes), np.inf))
+                for stayed, after in enumerate(program.stayed_after(kind)):
+                    here[after, ends] = np.minimum(here[after, ends], total[stayed])
         return self._ready[beat]

@@ -7,6 +7,7 @@ dance.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -70,7 +71,7 @@ def spread(
         if turn == rounds or not again.any():
             break
         shown_again += again
-        end = {program.n_beats: np.zeros(program.n_nodes)}
+        end = {program.n_beats: program.at_the_end}
         whole = program.solve(0, program.n_beats, after=end, price=program.costs.usage * shown_again / turn)
     return best
 
@@ -93,7 +94,8 @@ def _uses(program: Program, moves: list[Move]) -> Int:
 
 def _make_forwards(program: Program, whole: Solution, starts: Int) -> list[Move]:
     moves: list[Move] = []
-    beat, arrived = 0, None
+    beat = 0
+    arrived: tuple[int, int] | None = None
     used = np.zeros(program.n_nodes, np.int64)
     while beat < program.n_beats:
         last = min(beat + WINDOWS[0], program.n_beats)
@@ -105,7 +107,8 @@ def _make_forwards(program: Program, whole: Solution, starts: Int) -> list[Move]
         new = program.decode(part, first=beat, last=stop, arrived=arrived, starts=starts, price=price)
         used += _uses(program, new)
         moves += new
-        beat, arrived = program.ends(new[-1])
+        beat, node = program.ends(new[-1])
+        arrived = node, program.beats_stayed(moves)
     return moves
 
 
@@ -122,8 +125,18 @@ def _mend(program: Program, moves: list[Move], begin: int, end: int, starts: Int
         return None
     price = np.asarray(program.costs.usage * (uses - _uses(program, inside)), np.float64)
     first, last = int(beats[low]), int(beats[high])
-    after = np.zeros(program.n_nodes) if high == len(moves) else program.arrive_before(moves[high][1])
+    after = program.at_the_end
+    if high < len(moves):
+        after = program.arrive_before(moves[high][1], _to_next_transition(program, moves, high))
     part = program.solve(first, last, after={last: after}, price=price)
-    arrived = program.ends(moves[low - 1])[1] if low else None
+    arrived = (program.ends(moves[low - 1])[1], program.beats_stayed(moves[:low])) if low else None
     new = program.decode(part, first=first, last=last, arrived=arrived, starts=starts, price=price)
     return moves[:low] + new + moves[high:]
+
+
+def _to_next_transition(program: Program, moves: list[Move], index: int) -> int | None:
+    """Music beats from a move's start to the next transition after it; None where none follows."""
+    for before, after in itertools.pairwise(moves[index:]):
+        if program.ends(before)[1] != after[1]:
+            return after[0] - moves[index][0]
+    return None

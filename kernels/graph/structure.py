@@ -39,26 +39,29 @@ def structure_pins(
     path : Path of the song
     repeats : in order
     reach : Reach of the song
-    kept : the director's own pins; intervals they touch are left to them
+    kept : the director's own pins; what they would have otherwise is left to them
 
     Returns
     -------
     list of Pin, int
-        One pin an interval, and how many repeats they hold: those that can be danced again, one after the other.
+        One pin an interval, and how many repeats they hold: those that can be danced again, one after the other. What
+        is shown in both places is what the dance shows in the earlier one, or in the later one where only that is
+        directed.
     """
     node = node_of_interval(path)
-    directed = np.zeros(len(node), bool)
-    for pin in kept:
-        directed[pin.first : pin.last] = True
     found: list[Pin] = []
     n_held = 0
     for r in repeats:
-        pins = []
-        for later in range(r.first + FREE_BEATS, min(r.last, len(node)) - FREE_BEATS):
-            earlier = r.source + later - r.first
-            if not (directed[later] or directed[earlier]):
-                nodes = np.arange(reach.n_nodes) == node[earlier]
-                pins += [Pin("structure", k, k + 1, nodes) for k in (earlier, later)]
-        if pins and reach.keeps([*kept, *found, *pins]):
-            found, n_held = [*found, *pins], n_held + 1
+        length = min(r.last, len(node)) - r.first
+        is_directed = [any(p.first < at + length and p.last > at for p in kept) for at in (r.source, r.first)]
+        for origin in (r.first, r.source) if is_directed == [False, True] else (r.source, r.first):
+            pins = []
+            for k in range(FREE_BEATS, length - FREE_BEATS):
+                shown, places = node[origin + k], (r.source + k, r.first + k)
+                if all(p.sources(at)[shown] for at in places for p in kept if p.first <= at < p.last):
+                    nodes = np.arange(reach.n_nodes) == shown
+                    pins += [Pin("structure", at, at + 1, nodes) for at in places]
+            if pins and reach.keeps([*kept, *found, *pins]):
+                found, n_held = [*found, *pins], n_held + 1
+                break
     return found, n_held

@@ -30,7 +30,7 @@ class Match:
         The clip is read at this many of its frames for every frame of music.
     start_frame_index : int, frame of the clip under the segment's first
     score : float, >= 0
-        C of :func:`score`.
+        C of :func:`sums`.
     music_ratio : float, 0 to 2
         C / (sum of a / 2): 1 where the motion equals the music; 0 for silence.
     mutual_ratio : float, 0 to 1

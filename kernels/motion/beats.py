@@ -103,7 +103,18 @@ class MotionBeats:
 
 
 def check_position(position_m: Float, frame_rate_hz: float) -> None:
-    """Refuse what is not (F, J, 3) finite metres at a rate above 0, with a ValueError."""
+    """Refuse positions that beats and speeds cannot be had from.
+
+    Parameters
+    ----------
+    position_m : (F, J, 3) float, metres, world, J >= 1; F may be 0
+    frame_rate_hz : float, > 0
+
+    Raises
+    ------
+    ValueError
+        If the shape is another, a value is not finite, or the rate is not > 0.
+    """
     if position_m.ndim != 3 or position_m.shape[1] < 1 or position_m.shape[2] != 3:
         raise ValueError(f"position_m: want (F, J, 3) with J >= 1, got {position_m.shape}")
     if not np.isfinite(position_m).all():

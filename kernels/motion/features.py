@@ -187,6 +187,7 @@ def bumps(n_frames: int, at: Float, height: Float, *, width_s: float, rate_hz: f
     height : (B,) float, >= 0
     width_s : float, seconds, >= 0
         Standard deviation; 0 draws one frame a moment (raw impulses).
+    rate_hz : float, > 0, frames a second
 
     Returns
     -------
@@ -300,7 +301,19 @@ def _inside(found: MotionFeatures, n: int, first: int) -> MotionFeatures:
 
 
 def between(values: Float, frame: Int) -> Float:
-    """Largest value of each stretch between neighbouring frames, held over the stretch, (F,) float64."""
+    """Find the largest value of each stretch between neighbouring frames, and hold it over the stretch.
+
+    Parameters
+    ----------
+    values : (F,) float
+    frame : (B,) int64, not falling, 0 to F
+        The first stretch begins at 0, the last ends with the series.
+
+    Returns
+    -------
+    (F,) float64
+        Without frames the largest of all; empty for F = 0.
+    """
     out = np.zeros(len(values))
     cut = np.concatenate([[0], frame, [len(values)]])
     for a, b in itertools.pairwise(cut):
@@ -310,6 +323,18 @@ def between(values: Float, frame: Int) -> Float:
 
 
 def contacts_at_feature_rate(contact: NDArray[np.bool_], frame_rate_hz: float, n_values: int) -> NDArray[np.bool_]:
-    """Contacts of the nearest frame for each of ``n_values`` at 120 Hz, (n_values, 2) bool."""
+    """Read contacts at 120 Hz, each of the nearest frame.
+
+    Parameters
+    ----------
+    contact : (F, 2) bool, left and right foot, F >= 1 unless ``n_values`` is 0
+    frame_rate_hz : float, > 0, of ``contact``
+    n_values : int, >= 0
+
+    Returns
+    -------
+    (n_values, 2) bool
+        Beyond the last frame, as in it.
+    """
     nearest = np.rint(np.arange(n_values) * (frame_rate_hz / FEATURE_RATE_HZ)).astype(np.int64)
     return np.asarray(contact[np.clip(nearest, 0, max(len(contact) - 1, 0))], np.bool_)

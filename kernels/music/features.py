@@ -43,9 +43,24 @@ class MusicFeatures:
 
 
 def onset_strength(samples: Samples, sample_rate_hz: float) -> Float:
-    """Sum the rises of all bands, (F,) float64, >= 0, at 100 Hz; see :func:`kernels.music.onsets.flux`.
+    """Sum the rises of all bands; see :func:`kernels.music.onsets.flux`.
 
     Before the first sample there was silence: a song that starts with a sound has an onset there.
+
+    Parameters
+    ----------
+    samples : (n,) or (n, C) float, full scale -1 to 1
+    sample_rate_hz : float, > 0
+
+    Returns
+    -------
+    (F,) float64, >= 0, at 100 Hz
+        As many as :func:`kernels.music.onsets.band_levels` has frames, and empty where that is.
+
+    Raises
+    ------
+    ValueError
+        If :func:`kernels.music.onsets.band_levels` refuses the samples or the rate.
     """
     level, _ = band_levels(samples, sample_rate_hz)
     return np.asarray(flux(np.pad(level, ((2, 0), (0, 0))))[2:].sum(axis=1), np.float64)

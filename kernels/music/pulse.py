@@ -124,7 +124,19 @@ def _sampled(curve: Float, at: Float) -> Float:
 
 
 def layer_shapes(n_hidden: int) -> list[tuple[int, ...]]:
-    """List the shapes of the network's arrays in the order they are stored."""
+    """List the shapes of the network's arrays in the order they are stored.
+
+    Parameters
+    ----------
+    n_hidden : int, >= 1
+        Width of the hidden layers.
+
+    Returns
+    -------
+    list of shapes
+        Weights then bias of each layer: from the input curves, two a dilation (over time, then across), to the two
+        outputs.
+    """
     shapes: list[tuple[int, ...]] = [(N_CHANNELS, n_hidden), (n_hidden,)]
     for _ in DILATIONS:
         shapes += [(N_TAPS, n_hidden, n_hidden), (n_hidden,), (n_hidden, n_hidden), (n_hidden,)]

@@ -63,6 +63,11 @@ def beat_features(samples: Samples, sample_rate_hz: float, *, grid_s: Float) -> 
     (K, D) float64
         Levels of mel bands in groups of five and of pitch classes, each group centred over the song and scaled to the
         same spread; zeros in silence.
+
+    Raises
+    ------
+    ValueError
+        If a shape, a sample or the rate does not fit.
     """
     level, _ = band_levels(samples, sample_rate_hz)
     keys = key_levels(samples, sample_rate_hz, frame_rate_hz=FRAME_RATE_HZ / 2)

@@ -1,9 +1,13 @@
-"""Which OpenCL devices there are, and picking one of them."""
+"""Which OpenCL devices there are, picking one of them, and building kernels for it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import resources
+from typing import Literal
 
+import numpy as np
 import pyopencl as cl
 
 
@@ -35,7 +39,17 @@ class DeviceInfo:
 
 
 def full_name(device: cl.Device) -> str:
-    """Name a device with its platform and driver, as metadata and reports have it."""
+    """Name a device with its platform and driver, as metadata and reports have it.
+
+    Parameters
+    ----------
+    device : pyopencl.Device
+
+    Returns
+    -------
+    str
+        ``device (platform driver)``, of which the driver's version is part: results may differ in their last bits.
+    """
     return f"{device.name.strip()} ({device.platform.name.strip()} {device.driver_version.strip()})"
 
 
@@ -109,6 +123,77 @@ def pick_device(wanted: str | int | None = None) -> cl.Device:
                 return device
     there = "; ".join(str(info) for info in describe_devices())
     raise NoDeviceError(f"device: want {wanted!r}, found only {there}; name one of these by index or part of its name")
+
+
+def only_device(context: cl.Context) -> cl.Device:
+    """Give the device of a context of one.
+
+    Parameters
+    ----------
+    context : cl.Context
+
+    Returns
+    -------
+    cl.Device
+
+    Raises
+    ------
+    ValueError
+        If the context has not exactly one device.
+    """
+    if len(context.devices) != 1:
+        raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
+    return context.devices[0]
+
+
+def real_type(device: cl.Device, precision: Literal["single", "double"]) -> np.dtype[np.floating]:
+    """Give the type a device computes in.
+
+    Parameters
+    ----------
+    device : cl.Device
+    precision : "single" or "double"
+
+    Returns
+    -------
+    numpy.dtype, float32 or float64
+
+    Raises
+    ------
+    ValueError
+        If the device has no double precision and that is wanted.
+    """
+    if precision == "double" and not device.double_fp_config:
+        raise ValueError(f"precision: want single on {device.name.strip()}, got double; it has none")
+    return np.dtype(np.float64 if precision == "double" else np.float32)
+
+
+def build(
+    context: cl.Context, files: Sequence[str], defined: Mapping[str, object], *, flags: Sequence[str] = ()
+) -> cl.Program:
+    """Build kernels of this package.
+
+    Parameters
+    ----------
+    context : cl.Context
+    files : names of ``.cl`` files, read as one
+    defined : value of each constant of the source
+    flags : further options of the compiler
+
+    Returns
+    -------
+    cl.Program
+
+    Raises
+    ------
+    cl.RuntimeError
+        If the device's compiler refuses the source; its words are in the message.
+    """
+    folder = resources.files("kernels.opencl")
+    source = "\n".join(folder.joinpath(file).read_text(encoding="utf-8") for file in files)
+    constants = [part for name, value in defined.items() for part in ("-D", f"{name}={value}")]
+    built: cl.Program = cl.Program(context, source).build([*flags, *constants])
+    return built
 
 
 def _kind(device: cl.Device) -> str:

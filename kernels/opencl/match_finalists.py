@@ -43,10 +43,19 @@ def candidates(
 ) -> Iterator[tuple[NDArray[np.int32], Emitted]]:
     """List the candidates that may be the best of each pair, some pairs at a time so that ties need no more memory.
 
+    Parameters
+    ----------
+    stages : Stages
+    pairs : (N, 2) int32, segment and clip
+    score : (N,) float32
+        Candidates whose score, with the margin, reaches this are listed.
+
     Yields
     ------
     pairs : (M, 2) int32
-    Emitted of these pairs
+        Each pair lies in one portion; no pairs make one portion of none.
+    Emitted
+        Its ``pair`` counts within the portion.
     """
     waiting = [(pairs, score)]
     while waiting:

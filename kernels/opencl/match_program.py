@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from typing import Any
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.opencl.device import full_name
+from kernels.opencl.device import build, full_name, only_device
 
 RUN = 4  # pairs of one clip that one work-item refines together, depth first
 _LARGE_BYTES = 2**22
@@ -39,10 +38,8 @@ class Program:
     """
 
     def __init__(self, context: cl.Context, *, lanes: int | None = None, together: int | None = None) -> None:
-        if len(context.devices) != 1:
-            raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
         self.context = context
-        self.device = context.devices[0]
+        self.device = only_device(context)
         self.is_cpu = bool(self.device.type & cl.device_type.CPU)
         most = max(2 * self.device.preferred_vector_width_float, 4)
         self.lanes = lanes or max(width for width in (4, 8, 16) if width <= most)
@@ -87,12 +84,27 @@ class Program:
         cl.enqueue_nd_range_kernel(self.queue, kernel, whole, group)
 
     def buffer(self, content: NDArray[np.generic]) -> cl.Buffer:
-        """Copy an array to the device; one unused number where it is empty, for a buffer may not be."""
+        """Copy an array to the device; one unused number where it is empty, for a buffer may not be.
+
+        Parameters
+        ----------
+        content : array of any shape and number type
+            As many bytes as the kernel expects: nothing is converted.
+
+        Raises
+        ------
+        cl.MemoryError
+            If the device has not the memory.
+        """
         array = np.ascontiguousarray(content) if content.size else np.zeros(1, content.dtype)
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
 
     def room(self, n_bytes: int) -> cl.Buffer:
         """Make an unset buffer of at least 16 bytes.
+
+        Parameters
+        ----------
+        n_bytes : int, >= 0
 
         Raises
         ------
@@ -108,14 +120,32 @@ class Program:
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size=max(n_bytes, 16))
 
     def read(self, buffer: cl.Buffer, shape: tuple[int, ...], dtype: type[Any]) -> NDArray[Any]:
-        """Wait for the queue and copy the front of a buffer to the host."""
+        """Wait for the queue and copy the front of a buffer to the host.
+
+        Parameters
+        ----------
+        buffer : cl.Buffer of at least the bytes asked for
+        shape, dtype : of what is read
+
+        Returns
+        -------
+        array of that shape and type
+            Nothing is waited for where it has no elements.
+        """
         out = np.zeros(shape, dtype)
         if out.size:
             cl.enqueue_copy(self.queue, out, buffer)
         return out
 
     def write(self, buffer: cl.Buffer, content: NDArray[np.generic], *, offset_bytes: int = 0) -> None:
-        """Copy an array into a buffer."""
+        """Copy an array into a buffer.
+
+        Parameters
+        ----------
+        buffer : cl.Buffer
+        content : array of any shape and number type
+        offset_bytes : int, >= 0, where in the buffer it begins; it must end inside
+        """
         cl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(content), dst_offset=offset_bytes)
 
     def _program(self, name: str, is_safe: bool) -> cl.Program:
@@ -124,18 +154,7 @@ class Program:
         lanes = max(self.lanes // 2, 4) if name == "bound_together" else self.lanes
         key = (files[0], lanes, is_safe and files is _SEARCH)
         if key not in self._built:
-            folder = resources.files("kernels.opencl")
-            source = "\n".join(folder.joinpath(file).read_text(encoding="utf-8") for file in files)
+            defined = {"LANES": lanes, "WIDTH": self.together, "RUN": RUN} | ({"SAFE": 1} if key[2] else {})
             # -w: a compiler talks of how vectors are passed between functions that are all inlined.
-            options = [
-                "-w",
-                "-cl-mad-enable",
-                "-D",
-                f"LANES={lanes}",
-                "-D",
-                f"WIDTH={self.together}",
-                "-D",
-                f"RUN={RUN}",
-            ]
-            self._built[key] = cl.Program(self.context, source).build(options + (["-D", "SAFE"] if key[2] else []))
+            self._built[key] = build(self.context, files, defined, flags=["-w", "-cl-mad-enable"])
         return self._built[key]

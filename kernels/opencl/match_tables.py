@@ -63,15 +63,39 @@ class Tables:
         return 4 * (self.n_frames * (1 + n_rows) + self._slack * (1 + n_tables)) + 12 * len(self)
 
     def dense(self, n_frames: int) -> cl.Buffer:
-        """Table of blocks of so many frames, start by start."""
+        """Give the table of blocks of so many frames, start by start.
+
+        Parameters
+        ----------
+        n_frames : int, a block length of a plan that was built
+
+        Raises
+        ------
+        KeyError
+            If no plan that was built has it.
+        """
         return self._dense[n_frames]
 
     def folded(self, n_frames: int, starts: int) -> cl.Buffer:
-        """Table of the largest of neighbouring starts."""
+        """Give the table of the largest of neighbouring starts.
+
+        Parameters
+        ----------
+        n_frames, starts : int, block length and starts taken together, of a plan that was built
+
+        Raises
+        ------
+        KeyError
+            If no plan that was built has it.
+        """
         return self._folded[n_frames, starts]
 
     def build(self, plan: Plan) -> None:
         """Build the tables a plan reads and that are not there yet.
+
+        Parameters
+        ----------
+        plan : Plan
 
         Raises
         ------

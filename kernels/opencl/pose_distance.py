@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import resources
-
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
 from kernels.graph.distance import PoseFeatures, check_pair
-from kernels.opencl.device import full_name
+from kernels.opencl.device import build, full_name, only_device
 
 _ROWS = 8
 _LANES = (4, 8, 16)
@@ -37,16 +35,12 @@ class PoseDistance:
     """
 
     def __init__(self, context: cl.Context) -> None:
-        if len(context.devices) != 1:
-            raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
         self.context = context
-        self._device = context.devices[0]
+        self._device = only_device(context)
         # twice the preferred width hides the latency of the loads; a GPU says 1 and gets the smallest
         most = max(2 * self._device.preferred_vector_width_float, _LANES[0])
         self._lanes = max(width for width in _LANES if width <= most)
-        source = resources.files("kernels.opencl").joinpath("pose_distance.cl").read_text(encoding="utf-8")
-        options = ["-D", f"ROWS={_ROWS}", "-D", f"LANES={self._lanes}"]
-        self._program = cl.Program(context, source).build(options=options)
+        self._program = build(context, ["pose_distance.cl"], {"ROWS": _ROWS, "LANES": self._lanes})
         self._queue = cl.CommandQueue(context)
         kernel = cl.Kernel(self._program, "pose_distance")
         limit = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self._device)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from typing import Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from kernels.calibration.springs import JOINT_STIFFNESS, KEPT_SPEED, spring_body
 from kernels.calibration.tree_solver import BodyModel, Solved, Stream, check_stream
-from kernels.opencl.device import full_name
+from kernels.opencl.device import build, full_name, only_device, real_type
 
 _GROUP = 16
 
@@ -42,16 +41,11 @@ class SpringRelaxation:
         precision: Literal["single", "double"] = "double",
         is_serial: bool = False,
     ) -> None:
-        if len(context.devices) != 1:
-            raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
         self.context = context
         self.parent = parent
         self.is_serial = is_serial
-        self._device = context.devices[0]
-        if precision == "double" and not self._device.double_fp_config:
-            raise ValueError(f"precision: want single on {self._device.name.strip()}, got double; it has none")
-        self._dtype = np.dtype(np.float64 if precision == "double" else np.float32)
-        source = resources.files("kernels.opencl").joinpath("spring_relaxation.cl").read_text(encoding="utf-8")
+        self._device = only_device(context)
+        self._dtype = real_type(self._device, precision)
         options = {
             "REAL": "double" if precision == "double" else "float",
             "S": len(parent),
@@ -59,8 +53,7 @@ class SpringRelaxation:
             "JOINT": JOINT_STIFFNESS,
             "KEPT": KEPT_SPEED,
         }
-        defined = [part for name, value in options.items() for part in ("-D", f"{name}={value}")]
-        self._program = cl.Program(context, source).build(options=defined)
+        self._program = build(context, ["spring_relaxation.cl"], options)
         self._queue = cl.CommandQueue(context)
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from typing import Literal
 
 import numpy as np
@@ -10,7 +9,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from kernels.calibration.tree_solver import DAMPING, KINDNESS, BodyModel, Solved, Stream, check_stream
-from kernels.opencl.device import full_name
+from kernels.opencl.device import build, full_name, only_device, real_type
 
 _SCALE_M = 0.005  # variances are given in this, so that float32 works near 1
 _GROUP = 64
@@ -40,18 +39,13 @@ class TreeGaussNewton:
     def __init__(
         self, context: cl.Context, *, parent: tuple[int, ...], precision: Literal["single", "double"] = "single"
     ) -> None:
-        if len(context.devices) != 1:
-            raise ValueError(f"context: want one device, got {len(context.devices)}; make it from one device")
         self.context = context
         self.parent = parent
-        self._device = context.devices[0]
-        if precision == "double" and not self._device.double_fp_config:
-            raise ValueError(f"precision: want single on {self._device.name.strip()}, got double; it has none")
-        self._dtype = np.dtype(np.float64 if precision == "double" else np.float32)
+        self._device = only_device(context)
+        self._dtype = real_type(self._device, precision)
         is_cpu = bool(self._device.type & cl.device_type.CPU)
         self._lanes = (4 if precision == "double" else 8) if is_cpu else 1
         self._group = 1 if is_cpu else _GROUP
-        source = resources.files("kernels.opencl").joinpath("tree_gauss_newton.cl").read_text(encoding="utf-8")
         options = {
             "REAL": "double" if precision == "double" else "float",
             "LANES": self._lanes,
@@ -60,8 +54,7 @@ class TreeGaussNewton:
             "DAMPING": DAMPING,
             "KIND": 3 * KINDNESS * _SCALE_M**2,
         }
-        defined = [part for name, value in options.items() for part in ("-D", f"{name}={value}")]
-        self._program = cl.Program(context, source).build(options=defined)
+        self._program = build(context, ["tree_gauss_newton.cl"], options)
         self._queue = cl.CommandQueue(context)
 
     @property

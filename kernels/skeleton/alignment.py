@@ -63,17 +63,52 @@ class Rig:
 
 
 def bone_direction(joint: str) -> Float:
-    """Give the unit direction of a canonical joint's bone at rest, (3,)."""
+    """Give the direction of a canonical joint's bone at rest.
+
+    Parameters
+    ----------
+    joint : canonical name
+        The neck, or a joint of an arm or leg but its last.
+
+    Returns
+    -------
+    (3,) float64, unit
+
+    Raises
+    ------
+    KeyError
+        If the joint has no bone of its own.
+    """
     return unit(canonical.CANONICAL.offset_xyz_m[canonical.JOINTS.index(BONE[joint])])
 
 
 def foot_direction(pitch_rad: float) -> Float:
-    """Give the unit direction of a foot that points ahead at an elevation, (3,)."""
+    """Give the unit direction of a foot that points ahead.
+
+    Parameters
+    ----------
+    pitch_rad : float, radians
+        Elevation from ankle to toes; below 0 where the toes are lower.
+
+    Returns
+    -------
+    (3,) float64, in the plane of Y and Z
+    """
     return np.array([0.0, np.sin(pitch_rad), np.cos(pitch_rad)])
 
 
 def unit(vector: Float) -> Float:
-    """Vectors (..., 3) at length one; zero stays zero."""
+    """Bring vectors to length one.
+
+    Parameters
+    ----------
+    vector : (..., 3) float
+
+    Returns
+    -------
+    (..., 3) float64
+        What is shorter than 1e-12 is divided by that: zero stays zero.
+    """
     return np.asarray(vector / np.maximum(np.sqrt(np.sum(vector * vector, axis=-1, keepdims=True)), 1e-12), np.float64)
 
 
@@ -92,7 +127,17 @@ def turn(source: tuple[Float, Float], target: tuple[Float, Float]) -> Float:
 
 
 def rest_position(clip: Clip) -> Float:
-    """World positions (J, 3) at rest, with the median local position where the rig moves its joints."""
+    """Place a clip's joints at rest, with the median local position where its rig moves them.
+
+    Parameters
+    ----------
+    clip : Clip
+
+    Returns
+    -------
+    (J, 3) float64, metres, world
+        The skeleton's own rest for a clip of no frames or one that moves no joint but the root.
+    """
     position = kinematics.rest_position(clip.skeleton)
     if clip.translation_xyz_m is None or clip.n_frames == 0:
         return position

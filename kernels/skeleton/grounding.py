@@ -31,6 +31,7 @@ TOES_HEIGHT_M = float(_REST[TOES[0], 1])
 _LOWEST_TOES_M = 0.01
 _THIGH_M = float(np.linalg.norm(CANONICAL.offset_xyz_m[KNEES[0]]))
 _SHIN_M = float(np.linalg.norm(CANONICAL.offset_xyz_m[ANKLES[0]]))
+LEG_M = _THIGH_M + _SHIN_M
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def plant_legs(
     return bend_legs(position_xyz_m, orientation_wxyz, shift, limit_rad=give.leg_limit_rad)
 
 
-def cancel_steps(weight: Float, step: Float, frame_rate_hz: float, *, give: Give, pull: float) -> Float:
+def cancel_steps(weight: Float, step: Float, frame_rate_hz: float, *, give: Give, pull: Float | float) -> Float:
     """Find a displacement whose steps come near to wanted ones where they count, and which is slow and smooth besides.
 
     Parameters
@@ -164,13 +165,30 @@ def cancel_steps(weight: Float, step: Float, frame_rate_hz: float, *, give: Give
     step : (F - 1,) float, metres, the wanted steps times their weights
     frame_rate_hz : float, > 0
     give : Give, for the weight of added speed and the time of its changes
-    pull : float, per square second, > 0, weight of the displacement itself
+    pull : float or (F,) float, per square second, > 0, weight of the displacement itself
 
     Returns
     -------
     (F,) float64, metres
     """
     return _solve(len(weight) + 1, frame_rate_hz, give, step_weight=weight, step=step, pull=pull)
+
+
+def keep_places(weight: Float, place: Float, frame_rate_hz: float, *, give: Give) -> Float:
+    """Find a displacement that comes near to wanted places where they count, and which is slow and smooth besides.
+
+    Parameters
+    ----------
+    weight : (F,) float, per square second, > 0, of each place
+    place : (F,) float, metres
+    frame_rate_hz : float, > 0
+    give : Give, for the weight of added speed and the time of its changes
+
+    Returns
+    -------
+    (F,) float64, metres
+    """
+    return _solve(len(weight), frame_rate_hz, give, place_weight=weight, place=weight * place)
 
 
 def bend_legs(position_xyz_m: Float, orientation_wxyz: Float, shift_xyz_m: Float, *, limit_rad: float) -> Float:
@@ -248,7 +266,7 @@ def _solve(
     step: Float | None = None,
     place_weight: Float | None = None,
     place: Float | None = None,
-    pull: float = 0.0,
+    pull: Float | float = 0.0,
 ) -> Float:
     """Find a path of n points by least squares: weighted errors of steps and places, with its speed and its bends.
 

@@ -116,6 +116,11 @@ def to_local(skeleton: Skeleton, orientation_wxyz: Float) -> Float:
     -------
     (F, J, 4) float64, unit, local; the root's stays in the world
         In one hemisphere from frame to frame, first frame with w >= 0.
+
+    Raises
+    ------
+    ValueError
+        If a quaternion is zero or not finite.
     """
     local = np.array(orientation_wxyz, np.float64)
     child = np.arange(1, len(skeleton.joints))

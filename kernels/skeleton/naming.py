@@ -189,7 +189,17 @@ def _by_family(names: tuple[str, ...]) -> tuple[tuple[str, tuple[tuple[str, str]
 
 @lru_cache(maxsize=4096)
 def side_and_part(name: str) -> tuple[str, str]:
-    """Split a joint's name into its side (``"left"``, ``"right"`` or ``""``) and what is left of it, normalised."""
+    """Split a joint's name into its side (``"left"``, ``"right"`` or ``""``) and what is left of it, normalised.
+
+    Parameters
+    ----------
+    name : of a joint, in any script
+
+    Returns
+    -------
+    side : "left", "right" or ""
+    part : in lower case, without prefixes and separators; "" where nothing else stands
+    """
     text = re.split(r"[:|]", unicodedata.normalize("NFKC", name).strip())[-1]
     while (shorter := _PREFIX.sub("", text)) != text and shorter:
         text = shorter

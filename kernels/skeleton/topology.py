@@ -23,7 +23,18 @@ SPINE = {"spine": 0.10 / 0.51, "chest": 0.23 / 0.51, "upperChest": 0.36 / 0.51}
 
 
 def path_up(skeleton: Skeleton, joint: int) -> list[int]:
-    """List the joint and all above it, up to the root."""
+    """List the joint and all above it, up to the root.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    joint : int, 0 to J - 1
+
+    Returns
+    -------
+    list of int
+        From the joint to the root; the root alone for itself.
+    """
     path = [joint]
     while path[-1] > 0:
         path.append(int(skeleton.parent[path[-1]]))
@@ -31,14 +42,26 @@ def path_up(skeleton: Skeleton, joint: int) -> list[int]:
 
 
 def is_above(skeleton: Skeleton, upper: int, lower: int) -> bool:
-    """Whether ``upper`` is an ancestor of ``lower``, or the same joint."""
+    """Whether ``upper`` is an ancestor of ``lower``, or the same joint.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    upper, lower : int, 0 to J - 1
+    """
     while lower > upper:
         lower = int(skeleton.parent[lower])
     return lower == upper
 
 
 def common_ancestor(skeleton: Skeleton, a: int, b: int) -> int:
-    """Find the lowest joint above both, or one of them where it is above the other."""
+    """Find the lowest joint above both, or one of them where it is above the other.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+    a, b : int, 0 to J - 1
+    """
     while a != b:
         if a > b:
             a = int(skeleton.parent[a])

@@ -24,10 +24,22 @@ _X, _Y, _Z = np.eye(3)
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """What a move asks of the body over F frames; angles in radians, places in metres.
+    """What a move asks of the body over F frames; (2, …) are left and right.
 
-    ``foot`` is (2, F, 3), left and right: where the ankles shall be. ``raised`` and ``swing`` are (2, F): arms from
-    hanging (0) to level (pi/2) at the side, and forwards from the shoulder. ``elbow`` is (2, F).
+    Parameters
+    ----------
+    hips_xyz_m : (F, 3) float, metres, world
+    heading : (F,) float, radians
+        Where the body faces, from +Z towards +X.
+    hip_turn, chest_turn : (F,) float, radians
+        How far hips and chest are turned from there, about the vertical.
+    lean : (F,) float, radians, forwards
+    foot_xyz_m : (2, F, 3) float, metres, world
+        Where the ankles shall be.
+    foot_heading : (2, F) float, radians
+    raised, swing : (2, F) float, radians
+        Arms from hanging (0) to level (pi/2) at the side, and forwards from the shoulder.
+    elbow : (2, F) float, radians, 0 stretched
     """
 
     hips_xyz_m: Float
@@ -76,7 +88,24 @@ def plan_foot(beats: Float, places: Float, *, lift_m: float = 0.08) -> Float:
 
 
 def pose(figure: Figure, frame_rate_hz: float) -> Clip:
-    """Bring a figure onto the canonical skeleton: legs by inverse kinematics, feet flat, arms by angles."""
+    """Bring a figure onto the canonical skeleton: legs by inverse kinematics, feet flat, arms by angles.
+
+    Parameters
+    ----------
+    figure : Figure of F frames
+        An ankle out of reach is approached as far as the straight leg goes.
+    frame_rate_hz : float, > 0
+
+    Returns
+    -------
+    Clip
+        F frames on the canonical skeleton.
+
+    Raises
+    ------
+    ValueError
+        If the rate is not > 0, a value is not finite, or an ankle lies in its hip.
+    """
     f = len(figure.heading)
     local = np.zeros((f, len(JOINTS), 4))
     local[..., 0] = 1.0
@@ -131,7 +160,7 @@ def _places(offsets: list[tuple[float, float]], n: int, x_m: float) -> Float:
     return np.stack([x_m + pattern[:, 0], np.full(n, _ANKLE_M), pattern[:, 1]], axis=1)
 
 
-def step(beats: Float, size: float) -> Figure:
+def _step(beats: Float, size: float) -> Figure:
     """Step to the side and touch, arms swinging."""
     n, far = int(np.ceil(beats[-1])) + 2, 0.30 * size
     left = plan_foot(beats, _places([(0, 0), (0, 0), (far, 0), (far, 0)], n, 0.10))
@@ -144,7 +173,7 @@ def step(beats: Float, size: float) -> Figure:
     )
 
 
-def bounce(beats: Float, size: float) -> Figure:
+def _bounce(beats: Float, size: float) -> Figure:
     """Bend the knees on every beat: two turns a beat, down on it and up between."""
     dip = 0.11 * size * (0.5 + 0.5 * np.cos(2 * np.pi * beats)) ** 2
     base = _stand(beats, size)
@@ -153,14 +182,14 @@ def bounce(beats: Float, size: float) -> Figure:
     return _replace(base, hips_xyz_m=hips, elbow=np.stack([fold, fold]))
 
 
-def wave(beats: Float, size: float) -> Figure:
+def _wave(beats: Float, size: float) -> Figure:
     """Raise one arm and then the other."""
     up = 0.5 + 0.5 * np.cos(np.pi * beats)
     base = _stand(beats, size)
     return _replace(base, raised=0.2 + 2.3 * size * np.stack([up, 1 - up]), chest_turn=0.1 * (2 * up - 1))
 
 
-def twist(beats: Float, size: float) -> Figure:
+def _twist(beats: Float, size: float) -> Figure:
     """Turn hips and chest against each other on planted feet."""
     turn = 0.5 * size * np.cos(np.pi * beats)
     base = _stand(beats, size)
@@ -168,7 +197,7 @@ def twist(beats: Float, size: float) -> Figure:
     return _replace(base, hip_turn=0.4 * turn, chest_turn=-1.2 * turn, raised=arms, elbow=arms)
 
 
-def kick(beats: Float, size: float) -> Figure:
+def _kick(beats: Float, size: float) -> Figure:
     """Kick forwards with one leg and then the other, arms against them."""
     reach = np.clip(np.cos(np.pi * beats), 0, 1) ** 1.5, np.clip(-np.cos(np.pi * beats), 0, 1) ** 1.5
     base = _stand(beats, size)
@@ -178,7 +207,7 @@ def kick(beats: Float, size: float) -> Figure:
     return _replace(base, hips_xyz_m=hips, foot_xyz_m=foot, swing=np.stack([-arm, arm]))
 
 
-def rock(beats: Float, size: float) -> Figure:
+def _rock(beats: Float, size: float) -> Figure:
     """Rock forwards and back, one foot in front."""
     n, far = int(np.ceil(beats[-1])) + 2, 0.25 * size
     left = plan_foot(beats, _places([(0, far), (0, 0)], n, 0.10))
@@ -192,7 +221,7 @@ def rock(beats: Float, size: float) -> Figure:
     )
 
 
-def spin(beats: Float, size: float) -> Figure:
+def _spin(beats: Float, size: float) -> Figure:
     """Turn once round in four beats, a quarter a beat, arms opening and closing."""
     number = np.floor(beats)
     heading = np.pi / 2 * (number + ease(beats - number))
@@ -216,7 +245,7 @@ def spin(beats: Float, size: float) -> Figure:
     )
 
 
-def idle(beats: Float, size: float) -> Figure:
+def _idle(beats: Float, size: float) -> Figure:
     """Stand and breathe: no beats to speak of."""
     base = _stand(beats, size)
     sway = 0.004 * size * np.sin(2 * np.pi * beats / 7)
@@ -224,8 +253,17 @@ def idle(beats: Float, size: float) -> Figure:
 
 
 MOVES: dict[str, Callable[[Float, float], Figure]] = {
-    move.__name__: move for move in (step, bounce, wave, twist, kick, rock, spin, idle)
+    "step": _step,
+    "bounce": _bounce,
+    "wave": _wave,
+    "twist": _twist,
+    "kick": _kick,
+    "rock": _rock,
+    "spin": _spin,
+    "idle": _idle,
 }
+"""Moves by label: each takes time in beats, (F,) >= 0 with F >= 1, and a factor >= 0 on its size, and gives what it
+asks of the body over these F frames."""
 
 
 def take(
@@ -277,5 +315,14 @@ def take(
 
 
 def place(made: Take) -> Float:
-    """World positions of a take's joints, (F, 22, 3) float64, metres."""
+    """Place a take's joints in the world.
+
+    Parameters
+    ----------
+    made : Take of F frames
+
+    Returns
+    -------
+    (F, 22, 3) float64, metres
+    """
     return kinematics.place(made.clip)[0]

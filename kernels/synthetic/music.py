@@ -60,7 +60,22 @@ class Song:
     beats_per_bar: int
 
     def render(self, *, sample_rate_hz: int = 44100) -> NDArray[np.float32]:
-        """Play the song, (n, 1) float32."""
+        """Play the song: its notes by :func:`kernels.music.preview.render_preview`.
+
+        Parameters
+        ----------
+        sample_rate_hz : int, >= 8000
+
+        Returns
+        -------
+        (n, 1) float32, at most 0.8 in size
+            No samples without notes.
+
+        Raises
+        ------
+        ValueError
+            If the rate is below 8000.
+        """
         return render_preview(self.notes, sample_rate_hz=sample_rate_hz)
 
 

@@ -69,7 +69,18 @@ def posed(swings: Mapping[str, Float]) -> dict[str, Float]:
 
 
 def a_pose(angle_rad: float = np.pi / 4) -> dict[str, Float]:
-    """Axes of a rig at rest with its arms lowered."""
+    """Axes of a rig at rest with its arms lowered.
+
+    Parameters
+    ----------
+    angle_rad : float, radians
+        How far below the horizontal both arms hang.
+
+    Returns
+    -------
+    dict
+        For :class:`RigPlan`.
+    """
     return posed({f"{side}UpperArm": rotation.from_axis_angle(_Z, s * angle_rad) for side, s in _sides(-1.0)})
 
 
@@ -84,7 +95,18 @@ def lying() -> dict[str, Float]:
 
 
 def splayed(angle_rad: float = 0.35) -> dict[str, Float]:
-    """Axes of a rig at rest with its legs apart and its arms a little lowered."""
+    """Axes of a rig at rest with its legs apart and its arms lowered.
+
+    Parameters
+    ----------
+    angle_rad : float, radians
+        How far each leg stands out from the vertical, and each arm hangs below the horizontal.
+
+    Returns
+    -------
+    dict
+        For :class:`RigPlan`.
+    """
     legs = {f"{side}UpperLeg": rotation.from_axis_angle(_Z, s * angle_rad) for side, s in _sides(1.0)}
     arms = {f"{side}UpperArm": rotation.from_axis_angle(_Z, s * angle_rad) for side, s in _sides(-1.0)}
     return posed(legs | arms)

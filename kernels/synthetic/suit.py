@@ -293,7 +293,23 @@ def made_up(
     frozen: tuple[str, ...] = (),
     hinged: tuple[str, ...] = (),
 ) -> MadeUp:
-    """Record a made-up body going through its range of motion, all of one seed."""
+    """Record a made-up body going through its range of motion, all of one seed.
+
+    Parameters
+    ----------
+    seed : int, >= 0
+        Of the body, the motion and what spoils the recording.
+    disturbance : Disturbance, or None
+        As for :func:`record`.
+    n_frames : int, >= 0, at 120 Hz
+        The usual number makes 58 seconds.
+    size, frozen, hinged
+        As for :func:`range_of_motion`.
+
+    Returns
+    -------
+    MadeUp
+    """
     motion = range_of_motion(seed, n_frames=n_frames, size=size, frozen=frozen, hinged=hinged)
     return record(make_body(seed), motion, seed=seed, disturbance=disturbance)
 
@@ -324,7 +340,23 @@ def sways(rng: np.random.Generator, time_s: Float, degrees: Float, *, pace_hz: f
 
 
 def swap(recording: Recording, pairs: dict[str, str]) -> Recording:
-    """Exchange sensors: each key gets what the value's sensor said, and the other way round."""
+    """Exchange sensors: each key gets what the value's sensor said, and the other way round.
+
+    Parameters
+    ----------
+    recording : Recording
+    pairs : sensor to sensor, one entry a pair; exchanged in order
+
+    Returns
+    -------
+    Recording
+        As it was where there are no pairs.
+
+    Raises
+    ------
+    ValueError
+        If a name is no sensor of the recording.
+    """
     order = list(range(len(recording.sensors)))
     for one, other in pairs.items():
         a, b = recording.sensors.index(one), recording.sensors.index(other)

@@ -7,18 +7,13 @@ import numpy as np
 import pytest
 
 from assets import plots, tables
-from assets.calibration import calibrate_recording
-from assets.calibration_table import from_calibration
 from kernels.assembly.blend import assemble
 from kernels.assembly.quality import Measure
 from kernels.motion.beats import motion_beats
 from kernels.skeleton.canonical import CANONICAL
 from kernels.synthetic.dancer import place, take
-from kernels.synthetic.suit import made_up
 from kernels.types import BeatGrid, Choreography
-from schemas.calibration import CALIBRATION
 from schemas.motion import CLIP, MOTION_BEAT
-from schemas.settings import CalibrationSettings
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -113,29 +108,3 @@ def test_long_tables_are_cut_with_a_word():
     table = plots.markdown(("a",), [(i,) for i in range(100)], longest=10)
     assert table.count("\n| ") == 9 + 1
     assert "and 90 more" in table
-
-
-@pytest.fixture(scope="module")
-def joints():
-    found = calibrate_recording(made_up(3, n_frames=600).recording, settings=CalibrationSettings())
-    return from_calibration("s-take", found)
-
-
-def test_calibration_is_drawn_and_listed(joints):
-    data = plots.calibration(joints)
-    assert data.startswith(PNG)
-    assert plots.calibration(joints) == data
-    table = plots.calibration_table(joints)
-    assert len(table.splitlines()) == 2 + 16
-    assert "| l_forearm | l_upper_arm |" in table
-
-
-def test_calibrations_of_a_session(joints):
-    shown = plots.calibrations(joints, ["clips/s/a.csv: doubtful"])
-    assert shown.startswith("- clips/s/a.csv: doubtful")
-    assert "### s-take" in shown
-    assert plots.calibrations(CALIBRATION.empty(), []) == "no suit recordings"
-    many = tables.concat(
-        CALIBRATION, [joints.set_column(0, joints.schema.field(0), [[f"s-{k}"] * 16]) for k in range(8)]
-    )
-    assert "and 2 more recordings" in plots.calibrations(many, [])

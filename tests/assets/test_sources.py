@@ -1,209 +1,112 @@
-"""What is a source, which session it belongs to, who gets a key that two want."""
+"""Which file a key stands for, and what a version is a version of."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from assets.formats.tree import HashCache
-from assets.sources import LARGEST_SESSION, scan, session_version, song_version
-from schemas.settings import Limits, Settings
+from assets.formats.clips_csv import Facts
+from assets.formats.errors import FormatError
+from assets.sources import (
+    Clip,
+    Request,
+    Song,
+    Sources,
+    brief_of,
+    brief_version,
+    fingerprint,
+    request_of,
+    request_version,
+    session_version,
+    song_version,
+)
+from pipelines.resources import StudioFolder
+from schemas.settings import Brief
+
+CLIP = Clip("s-a", "s", "clips/s/a.bvh", "ab", Facts(label="spin"))
+SONG = Song("waltz", "songs/waltz.wav", "cd", "audio", "songs/waltz.brief.toml")
 
 
 @pytest.fixture
 def studio(tmp_path):
-    """Write files of a studio: {path: bytes}."""
-
-    def write(files):
-        for path, data in files.items():
-            (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-            (tmp_path / path).write_bytes(data)
-        return tmp_path
-
-    return write
+    (tmp_path / "songs").mkdir()
+    (tmp_path / "songs/waltz.wav").write_bytes(b"x")
+    return StudioFolder(tmp_path)
 
 
-def look(root, *, settings=None, sessions=()):
-    return scan(root, settings or Settings(), sessions_in_use=sessions, cache=HashCache(root / "lake" / "hashes.json"))
+def say(studio, text):
+    (studio.root / "songs/waltz.brief.toml").write_text(text)
 
 
-def test_clips_and_songs_with_keys_and_sessions(studio):
-    root = studio(
-        {"clips/a/b/One.bvh": b"1", "clips/two.BVH": b"2", "songs/Waltz No 1.mp3": b"3", "songs/x/y.mid": b"4"}
-    )
-    found = look(root)
-    assert [(c.key, c.session, c.path) for c in found.clips] == [
-        ("clips-two", "clips", "clips/two.BVH"),
-        ("a-b-one", "a-b", "clips/a/b/One.bvh"),
-    ]
-    assert [(s.key, s.kind) for s in found.songs] == [("waltz_no_1", "audio"), ("y", "midi")]
+def test_readable_file_stands_for_a_key_that_two_want():
+    refused = replace(SONG, path="songs/a.wav", problem="want its own key")
+    found = Sources((), (refused, SONG))
+    assert found.song("waltz") == SONG
+    assert found.songs_by_key() == {"waltz": (refused, SONG)}
+    with pytest.raises(KeyError):
+        found.song("polka")
 
 
-def test_empty_studio_has_nothing(tmp_path):
-    assert look(tmp_path).clips == ()
-    assert look(tmp_path).songs == ()
+def test_clips_by_session_in_order_of_sessions():
+    other = replace(CLIP, key="r-a", session="r")
+    assert list(Sources((CLIP, other), ()).sessions().items()) == [("r", (other,)), ("s", (CLIP,))]
 
 
-def test_documents_are_no_sources_and_strangers_are_refused(studio):
-    found = look(studio({"clips/LICENSE.txt": b"", "clips/x.fbx": b"x", "songs/x.zip": b"x", "songs/readme.md": b""}))
-    assert [c.problem[:32] for c in found.clips] == ["want a BVH file (.bvh) or a suit"]
-    assert [s.problem[:10] for s in found.songs] == ["want audio"]
+def test_session_version_follows_bytes_labels_and_refusals():
+    others = [replace(CLIP, sha256="ef"), replace(CLIP, facts=Facts(label="kick")), replace(CLIP, problem="no")]
+    versions = {session_version([clip]) for clip in [CLIP, *others]} | {session_version([])}
+    assert len(versions) == 5
+    assert session_version([replace(CLIP)]) == session_version([CLIP])
 
 
-def test_one_stem_as_audio_and_midi_makes_two_songs(studio):
-    found = look(studio({"songs/a.mid": b"m", "songs/a.wav": b"w", "songs/a.mp3": b"p", "songs/b.mid": b"m"}))
-    assert {s.path: s.key for s in found.songs} == {
-        "songs/a.wav": "a",
-        "songs/a.mp3": "a_mp3",
-        "songs/a.mid": "a_mid",
-        "songs/b.mid": "b",
-    }
-    assert not any(s.problem for s in found.songs)
+def test_song_version_leaves_the_brief_out():
+    assert song_version([SONG]) == song_version([replace(SONG, brief="")])
+    assert song_version([SONG]) != song_version([replace(SONG, sha256="ef")])
 
 
-def test_key_wanted_twice_goes_to_the_first_path(studio):
-    found = look(studio({"clips/s/a b.bvh": b"1", "clips/s/a_b.bvh": b"2", "songs/C.wav": b"1", "songs/c.wav": b"2"}))
-    assert [bool(c.problem) for c in found.clips] == [False, True]
-    assert "clips/s/a b.bvh has" in found.clips[1].problem
-    assert found.song("c").path == "songs/C.wav"
-    assert len(found.songs_by_key()["c"]) == 2
+def test_fingerprint_knows_no_order_of_keys():
+    assert fingerprint({"a": 1, "b": 2}) == fingerprint({"b": 2, "a": 1}) != fingerprint({"a": 2, "b": 1})
+    with pytest.raises(TypeError):
+        fingerprint({"a": Path("a")})
 
 
-def test_labels_come_from_the_nearest_table_else_from_the_folder(studio):
-    found = look(
-        studio(
-            {
-                "clips/clips.csv": b"file,label\nday/a.bvh,far\nday/b.bvh,far\n",
-                "clips/day/clips.csv": b"file,label,licence\na.bvh,near,CC0-1.0\nc.bvh,,MIT\n",
-                "clips/day/a.bvh": b"1",
-                "clips/day/b.bvh": b"2",
-                "clips/day/c.bvh": b"3",
-            }
-        )
-    )
-    assert [c.facts.label for c in found.clips] == ["near", "far", "day"]
-    assert [c.facts.licence for c in found.clips] == ["CC0-1.0", "", "MIT"]
+def test_brief_version_follows_beats_alone_and_their_file(studio):
+    say(studio, '[beats]\nfile = "waltz.beats"\n')
+    without = brief_version(studio, [SONG])
+    (studio.root / "songs/waltz.beats").write_text("0.5\n")
+    first = brief_version(studio, [SONG])
+    (studio.root / "songs/waltz.beats").write_text("0.6\n")
+    second = brief_version(studio, [SONG])
+    say(studio, 'allow = ["MIT"]\n[beats]\nfile = "waltz.beats"\n')
+    assert len({without, first, second, brief_version(studio, [replace(SONG, brief="")])}) == 4
+    assert brief_version(studio, [SONG]) == second
 
 
-def test_labels_of_a_data_set_copied_with_its_own_paths(studio):
-    found = look(
-        studio(
-            {
-                "clips/set/labels.csv": b"path,content,style\nroot/of/data/x.bvh,walk,angry\n",
-                "clips/set/sub/x.bvh": b"1",
-            }
-        )
-    )
-    assert (found.clips[0].facts.label, found.clips[0].facts.style) == ("walk", "angry")
+def test_brief_that_cannot_be_read_counts_by_its_bytes_and_says_nothing(studio):
+    say(studio, "allow = [")
+    broken = brief_version(studio, [SONG])
+    say(studio, "allow = [[")
+    assert brief_version(studio, [SONG]) != broken
+    assert brief_of(studio, "waltz", Sources((), (SONG,))) == Brief()
+    with pytest.raises(FormatError):
+        studio.brief(SONG)
 
 
-def test_broken_table_is_a_note(studio):
-    found = look(studio({"clips/s/clips.csv": b"nothing", "clips/s/a.bvh": b"1"}))
-    assert "clips/s/clips.csv" in found.notes[0]
-    assert found.clips[0].facts.label == "s"
+def test_brief_of_a_song_is_that_of_the_file_that_is_not_refused(studio):
+    say(studio, 'allow = ["MIT"]\n')
+    sources = Sources((), (replace(SONG, problem="no"), SONG))
+    assert brief_of(studio, "waltz", sources).allow == ("MIT",)
+    assert brief_of(studio, "polka", sources) == Brief()
 
 
-def test_rows_for_no_file_and_columns_misspelt_are_notes(studio):
-    column, rows = look(studio({"clips/clips.csv": b"file,lable\nlost.bvh,a\ngone.bvh,b\n"})).notes
-    assert "column 'lable' is not read; if 'label' was meant" in column
-    assert "clips/clips.csv: 2 of 2 rows speak of no file here, such as 'gone.bvh'" in rows
-
-
-def test_a_link_that_leads_nowhere_is_a_note(studio):
-    root = studio({"clips/one.bvh": b"1"})
-    (root / "clips" / "kept_elsewhere.bvh").symlink_to(root / "nowhere.bvh")
-    (note,) = look(root).notes
-    assert note.startswith("clips/kept_elsewhere.bvh: is a link that leads nowhere: No such file")
-
-
-def test_too_large_is_refused_unread(studio):
-    root = studio({"clips/s/a.bvh": b"1" * 2000})
-    found = look(root, settings=Settings(limits=Limits(largest_clip_mb=0.001)))
-    assert "at most 0.001 MB" in found.clips[0].problem
-    assert found.clips[0].sha256 == ""
-
-
-def test_versions_follow_content_labels_and_names_only(studio):
-    root = studio({"clips/s/a.bvh": b"1", "songs/x.wav": b"1"})
-    before = look(root)
-    again = look(root)
-    assert session_version(before.clips) == session_version(again.clips)
-    (root / "clips/s/a.bvh").write_bytes(b"22")
-    (root / "songs/x.wav").write_bytes(b"22")
-    after = look(root)
-    assert session_version(before.clips) != session_version(after.clips)
-    assert song_version(before.songs) != song_version(after.songs)
-    assert before.clips[0].key == after.clips[0].key
-    (root / "clips/s/clips.csv").write_text("file,label\na.bvh,spin\n")
-    assert session_version(look(root).clips) != session_version(after.clips)
-
-
-def test_large_folder_is_split_into_parts_that_stay_put(studio):
-    files = {f"clips/big/c{i:04d}.bvh": b"x" for i in range(600)}
-    root = studio(files)
-    found = look(root).sessions()
-    assert all(len(clips) <= LARGEST_SESSION for clips in found.values())
-    assert all(key.startswith("big-part_") for key in found)
-    assert {c.key for clips in found.values() for c in clips} == {f"big-c{i:04d}" for i in range(600)}
-    before = {c.path: c.session for clips in found.values() for c in clips}
-    for path in list(files)[:200]:
-        (root / path).unlink()
-    studio({f"clips/big/new{i}.bvh": b"x" for i in range(50)})
-    after = {c.path: c.session for c in look(root, sessions=list(found)).clips}
-    assert all(after[path] == before[path] for path in after if path in before)
-
-
-def test_folder_at_the_limit_is_one_session(studio):
-    root = studio({f"clips/s/{i}.bvh": b"x" for i in range(LARGEST_SESSION)})
-    assert list(look(root).sessions()) == ["s"]
-
-
-def test_name_that_is_no_text_is_listed(studio, tmp_path):
-    import os
-
-    (tmp_path / "clips" / "s").mkdir(parents=True)
-    try:
-        (tmp_path / "clips" / "s" / os.fsdecode(b"bad\xff.bvh")).write_bytes(b"x")
-    except OSError:
-        pytest.skip("this file system takes only UTF-8 names")
-    (clip,) = look(tmp_path).clips
-    assert clip.key.startswith("s-bad")
-
-
-def test_brief_beside_a_song(studio):
-    found = look(studio({"songs/x.wav": b"1", "songs/x.brief.toml": b"", "songs/y.wav": b"2"}))
-    assert [s.brief for s in found.songs] == ["songs/x.brief.toml", ""]
-
-
-SUIT = b"frame,time_s,sensor,px_m,py_m,pz_m,qw,qx,qy,qz,is_valid\n"
-
-
-def test_suit_recordings_are_clips_and_other_tables_are_not(studio):
-    found = look(
-        studio(
-            {
-                "clips/s/take.csv": SUIT,
-                "clips/s/Take Two.parquet": b"PAR1",
-                "clips/s/walk.bvh": b"x",
-                "clips/s/clips.csv": b"file,label\ntake.csv,rom\n",
-                "clips/s/labels_more.csv": b"file,label\n",
-                "clips/s/budget.csv": b"item,price\n",
-                "clips/s/take.poses.parquet": b"PAR1",
-            }
-        )
-    )
-    assert [(c.key, c.kind, c.problem) for c in found.clips] == [
-        ("s-take_two", "suit", ""),
-        ("s-take", "suit", ""),
-        ("s-walk", "bvh", ""),
-    ]
-    assert all(c.session == "s" and c.sha256 for c in found.clips)
-    assert {c.path: c.facts.label for c in found.clips}["clips/s/take.csv"] == "rom"
-    assert found.notes == ("clips/s/budget.csv: its first line has no columns of a suit recording; left alone",)
-
-
-def test_a_table_that_says_what_clips_are_is_never_one_itself(studio):
-    """Whatever its columns."""
-    assert look(studio({"clips/s/clips.csv": SUIT, "clips/s/labels.csv": SUIT})).clips == ()
-
-
-def test_one_stem_as_bvh_and_recording_goes_to_the_first(studio):
-    found = look(studio({"clips/s/a.bvh": b"x", "clips/s/a.csv": SUIT}))
-    assert [bool(c.problem) for c in found.clips] == [False, True]
+def test_request_version_follows_command_and_brief_but_not_the_character(studio):
+    sources = Sources((), (SONG,))
+    assert request_of(studio, "waltz|graph") == Request()
+    plain = request_version(studio, "waltz|graph", sources)
+    studio.remember("waltz|graph", Request(character="s-a"))
+    assert request_of(studio, "waltz|graph") == Request(character="s-a")
+    assert request_version(studio, "waltz|graph", sources) == plain
+    studio.remember("waltz|graph", Request(seed=1))
+    asked = request_version(studio, "waltz|graph", sources)
+    say(studio, 'allow = ["MIT"]\n')
+    assert len({plain, asked, request_version(studio, "waltz|graph", sources)}) == 3

@@ -13,6 +13,7 @@ from schemas.keys import (
     part_key,
     part_of,
     parts_in_use,
+    seen_label,
     session_key,
     slug,
     song_key,
@@ -93,3 +94,19 @@ def test_an_image_has_a_name_of_its_own_that_is_no_key_and_tells_its_clip():
     assert not is_mirrored("ayame-step")
     assert source_clip(image) == source_clip("ayame-step") == "ayame-step"
     assert not is_key(image)
+
+
+@pytest.mark.parametrize(
+    ("label", "seen"),
+    [
+        ("wave-right-hand", "wave-left-hand"),
+        ("walk_turn_left", "walk_turn_right"),
+        ("Left to RIGHT", "Right to LEFT"),
+        ("bright", "bright"),
+        ("leftover", "leftover"),
+        ("", ""),
+    ],
+)
+def test_a_mirrored_clip_shows_the_other_side(label, seen):
+    assert seen_label(label, mirrored("a-b")) == seen
+    assert seen_label(label, "a-b") == label

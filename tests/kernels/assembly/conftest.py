@@ -50,8 +50,8 @@ def phrases():
 def dance(clips):
     """Assemble at 60 frames a second."""
 
-    def make(steps):
+    def make(steps, others=None):
         duration_s = float(steps.song_end_s[-1])
-        return assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=duration_s)
+        return assemble(steps, others or clips, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=duration_s)
 
     return make

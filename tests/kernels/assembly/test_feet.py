@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from kernels import rotation
 from kernels.assembly.blend import Dance, Lineage, assemble
-from kernels.assembly.feet import clip_contacts, lock_feet, planted_feet
+from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.foot_quality import foot_measures
 from kernels.assembly.seam_quality import seam_measures
+from kernels.assembly.stance import clip_contacts
 from kernels.motion.contacts import FootContacts
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.canonical import CANONICAL
@@ -90,3 +92,64 @@ def test_a_dragged_foot_is_held():
         np.zeros_like(stands), np.zeros_like(stands), 0.0, grounding.ANKLE_HEIGHT_M, grounding.TOES_HEIGHT_M
     )
     np.testing.assert_allclose(lock_feet(pushed, nothing).position_xyz_m, position, atol=1e-3)
+
+
+def held_apart(width_m, *, bend_rad=0.3):
+    """Two stances side by side, the second wider, mixed over 0.4 s: what a seam does to planted feet; rate 60."""
+    n, rate = 180, 60.0
+    bend = rotation.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array([-bend_rad, 2 * bend_rad, -bend_rad]))
+    q = np.tile(rotation.IDENTITY, (22, 1))
+    for side in range(2):
+        for k, joints in enumerate((grounding.THIGHS, grounding.KNEES, grounding.ANKLES)):
+            q[joints[side]] = bend[k]
+    position, orientation = kinematics.forward(CANONICAL, CANONICAL.offset_xyz_m[:1], q[None])
+    wide = np.zeros((1, 2, 3))
+    wide[0, 0, 0], wide[0, 1, 0] = width_m / 2, -width_m / 2
+    spread = kinematics.to_local(CANONICAL, grounding.bend_legs(position, orientation, wide, limit_rad=1.0))[0]
+    share = np.clip((np.arange(n) / rate - 1.3) / 0.4, 0, 1)
+    mixed = rotation.slerp(np.tile(q, (n, 1, 1)), np.tile(spread, (n, 1, 1)), (share**2 * (3 - 2 * share))[:, None])
+    root = np.tile(CANONICAL.offset_xyz_m[:1], (n, 1))
+    position, _ = kinematics.forward(CANONICAL, root, mixed)
+    step = (np.arange(n) >= 90).astype(int)
+    weight = np.minimum(share, 1 - share)
+    lineage = Lineage(step, np.arange(n) / rate, np.where(weight > 0, 1 - step, -1), np.full(n, np.nan), weight)
+    stands = np.ones((n, 2), bool)
+    planted = FootContacts(stands, stands, 0.0, grounding.ANKLE_HEIGHT_M, grounding.TOES_HEIGHT_M)
+    return Dance(rate, root, mixed, position, lineage), planted
+
+
+@pytest.mark.parametrize("bend_rad", [0.05, 0.3])
+def test_stances_of_other_widths_hold_their_feet_and_their_knees(bend_rad):
+    mixed, planted = held_apart(0.1, bend_rad=bend_rad)
+    held = lock_feet(mixed, planted)
+    feet = held.position_xyz_m[:, grounding.ANKLES]
+    blend = slice(78, 103)
+    assert np.ptp(mixed.position_xyz_m[blend][:, grounding.ANKLES][..., 0], axis=0).min() > 0.045
+    assert np.ptp(feet[blend][..., 0], axis=0).max() < 0.006
+    assert np.abs(np.diff(feet[..., 0], axis=0)).max() * 60 < 0.02
+    knee = held.position_xyz_m[:, grounding.KNEES] - held.position_xyz_m[:, grounding.THIGHS]
+    shin = held.position_xyz_m[:, grounding.ANKLES] - held.position_xyz_m[:, grounding.KNEES]
+    angle = np.arccos((knee * shin).sum(-1) / np.linalg.norm(knee, axis=-1) / np.linalg.norm(shin, axis=-1))
+    np.testing.assert_allclose(angle, 2 * bend_rad, atol=0.1)
+
+
+def test_a_foot_comes_home_when_it_is_lifted():
+    mixed, planted = held_apart(0.1)
+    lifted = planted.ankle.copy()
+    lifted[40:70] = lifted[140:170] = False
+    free = lock_feet(mixed, FootContacts(lifted, lifted, 0.0, planted.ankle_height_m, planted.toes_height_m))
+    away = np.abs(free.position_xyz_m - mixed.position_xyz_m)[:, grounding.ANKLES, 0].max(axis=1)
+    assert away[120] > 0.015
+    assert away[[0, 179]].max() < 0.4 * away[120]
+
+
+def test_a_foot_that_swings_through_the_floor_is_raised():
+    mixed, planted = held_apart(0.0)
+    sunk = mixed.root_xyz_m.copy()
+    sunk[140:144, 1] -= np.array([0.05, 0.1, 0.1, 0.05])
+    position, _ = kinematics.forward(CANONICAL, sunk, mixed.rotation_wxyz)
+    low = Dance(mixed.frame_rate_hz, sunk, mixed.rotation_wxyz, position, mixed.lineage)
+    held = lock_feet(low, planted).position_xyz_m[:, grounding.TOES, 1]
+    assert position[:, grounding.TOES, 1].min() < -0.03
+    assert held.min() > -1e-6
+    np.testing.assert_allclose(held[:139], position[:139, grounding.TOES, 1], atol=2e-3)

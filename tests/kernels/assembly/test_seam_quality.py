@@ -1,7 +1,13 @@
 """Smoothness of seams: a seam that is none, plain cuts, one rough seam among smooth ones."""
 
-from kernels.assembly.seam_quality import seam_measures
+from dataclasses import replace
+
+import numpy as np
+
+from kernels import rotation
+from kernels.assembly.seam_quality import peak_ratios, seam_measures
 from kernels.skeleton.canonical import CANONICAL
+from kernels.types import Clip
 
 
 def values(measures):
@@ -48,3 +54,15 @@ def test_no_seam_is_no_trouble(phrases, dance, clips):
     found = seam_measures(dance(steps), steps, clips, skeleton=CANONICAL)
     assert values(found)["seam_count"] == 0
     assert passed(found)["seam_jerk_ratio"]
+
+
+def test_clips_that_stand_still_may_move_a_little_at_their_seams(phrases, dance, clips):
+    q = np.tile(rotation.IDENTITY, (300, 22, 1))
+    still = Clip(CANONICAL, 30.0, np.tile(CANONICAL.offset_xyz_m[0], (300, 1)), q)
+    bent = q.copy()
+    bent[:, CANONICAL.joints.index("head")] = rotation.from_axis_angle(np.array([1.0, 0.0, 0.0]), 0.02)
+    steps = phrases(("still", 0.5, 4, 0.5, 0.5), ("bent", 0.5, 4, 0.5, 0.5), blend_s=0.4)
+    for second, is_seen in ((replace(still, rotation_wxyz=bent), False), (clips["wave"], True)):
+        both = {"still": still, "bent": second}
+        found = peak_ratios(dance(steps, both), steps, {"still": still, "bent": still}, skeleton=CANONICAL, reach_s=0.3)
+        assert (found.max() > 1) == is_seen

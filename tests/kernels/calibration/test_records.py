@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kernels.calibration.records import JOINTS, PARENT, PARENT_SENSOR, SENSORS, Calibration, Finding, Recording
+from kernels.calibration.records import JOINTS, PARENT, PARENT_SENSOR, SENSORS, Recording
 
 
 def test_seventeen_sensors_parents_first():
@@ -36,8 +36,3 @@ def test_a_recording_counts_its_frames():
         recording(sensors=("a", "a"))
     with pytest.raises(ValueError, match="frame_rate_hz"):
         recording(frame_rate_hz=0.0)
-
-
-def test_a_calibration_knows_whether_it_may_be_used():
-    assert not Calibration((), (Finding("warning", "head", 3, "…"),)).has_errors
-    assert Calibration((), (Finding("error", None, None, "…"),)).has_errors

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from kernels.graph.costs import stride_cost, warp_cost
 from kernels.graph.distance import PoseFeatures
 from kernels.graph.nodes import beat_nodes
+from kernels.graph.path import STEPS
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.kinematics import forward
 from kernels.types import MotionGraph
@@ -84,3 +86,50 @@ def make_random_graph(make_graph):
         return make_graph(beats, [(int(a), int(b), float(rng.integers(1, 5))) for a, b in sorted(pairs)])
 
     return make
+
+
+@pytest.fixture
+def every_dance():
+    """Every dance within the hard bounds: its cost, what ties go by, its moves; found by trying everything."""
+
+    def find(graph, beat_s, costs, starts, admissible=None, step_price=None):
+        n = len(beat_s) - 1
+        scale = costs.transition_scale or (np.percentile(graph.weight, 95) if len(graph.weight) else 1.0)
+        jumps = {}
+        for s, t, w in zip(graph.source.tolist(), graph.target.tolist(), graph.weight.tolist(), strict=True):
+            back_s = graph.time_s[s] - graph.time_s[t]
+            goes_back = graph.clip_index[s] == graph.clip_index[t] and 0 <= back_s <= costs.jump_back_window_s
+            cost = costs.seam + costs.transition * w / scale + costs.jump_back * goes_back
+            jumps.setdefault(s, []).append((t, cost))
+        found = []
+
+        def dance(beat, ready, moves, cost, order):
+            if beat == n:
+                found.append((cost, order, moves))
+                return
+            for is_jump, node, price, stayed in ready:
+                for kind, (m, d) in enumerate(STEPS):
+                    end = node
+                    for _ in range(m):
+                        end = int(graph.next_node[end]) if end >= 0 else -1
+                    if end < 0 or beat + d > n:
+                        continue
+                    if admissible is not None and not admissible[beat : beat + d, node].all():
+                        continue
+                    ratio = (beat_s[beat + d] - beat_s[beat]) / (graph.time_s[end] - graph.time_s[node])
+                    if not costs.hard_ratio[0] - 1e-9 <= ratio <= costs.hard_ratio[1] + 1e-9:
+                        continue
+                    wish = 0.0 if step_price is None or (beat, kind) not in step_price else step_price[beat, kind][node]
+                    if np.isinf(wish):
+                        continue
+                    step = float(warp_cost(ratio, costs)) + stride_cost(m, d, costs) + wish
+                    left = max(costs.stay_beats - stayed - d, 0) / costs.stay_beats * costs.stay
+                    on = [(0, end, 0.0, stayed + d), *((1, t, c + left, 0) for t, c in jumps.get(end, []))]
+                    dance(
+                        beat + d, on, [*moves, (beat, node, kind)], cost + price + step, [*order, is_jump, node, kind]
+                    )
+
+        dance(0, [(0, int(node), 0.0, 10**6) for node in starts], [], 0.0, [])
+        return found
+
+    return find

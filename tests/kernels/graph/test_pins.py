@@ -7,7 +7,8 @@ import pytest
 
 from kernels.graph.costs import PathCosts
 from kernels.graph.path import STEPS, find_path
-from kernels.graph.pins import Pin, Reach, admitted, find_conflict
+from kernels.graph.pins import Pin, Reach, admitted, find_conflict, step_price
+from kernels.graph.poses import pose_steps
 
 NO_USAGE = PathCosts(usage=0.0)
 
@@ -17,80 +18,99 @@ def reach_of(graph, beat_s, starts=None):
     return Reach(graph, beat_s, costs=NO_USAGE, starts=starts)
 
 
-def is_kept(graph, beat_s, pins, bounds):
-    """Try every dance there is."""
-    n = len(beat_s) - 1
-    mask = admitted(pins, n, len(graph.clip_index))
-    jumps = {}
-    for s, t in zip(graph.source.tolist(), graph.target.tolist(), strict=True):
-        jumps.setdefault(s, []).append(t)
-
-    def dance(beat, ready):
-        if beat == n:
-            return True
-        for node in ready:
-            for m, d in STEPS:
-                end = node
-                for _ in range(m):
-                    end = int(graph.next_node[end]) if end >= 0 else -1
-                if end < 0 or beat + d > n or not mask[beat : beat + d, node].all():
-                    continue
-                ratio = (beat_s[beat + d] - beat_s[beat]) / (graph.time_s[end] - graph.time_s[node])
-                if bounds[0] <= ratio <= bounds[1] and dance(beat + d, [end, *jumps.get(end, [])]):
-                    return True
-        return False
-
-    return dance(0, range(len(graph.clip_index)))
-
-
 def random_case(seed, make_graph):
-    """Three short clips, a few one-way streets, up to four pins."""
+    """Four short clips at the song's pace, twice and half of it; up to six pins of every kind, some that overlap."""
     rng = np.random.default_rng(seed)
-    beats = [np.cumsum(rng.uniform(0.42, 0.6, rng.integers(3, 6))) for _ in range(3)]
+    paces = rng.permutation([0.5, 0.5, 0.26, 1.0])
+    beats = [np.cumsum(pace * rng.uniform(0.85, 1.15, rng.integers(3, 6))) for pace in paces]
     n = sum(map(len, beats))
-    pairs = {tuple(rng.integers(n, size=2)) for _ in range(5)}
+    pairs = {tuple(rng.integers(n, size=2)) for _ in range(9)}
     graph = make_graph(beats, [(int(s), int(t), 0.3) for s, t in sorted(pairs) if s != t], both_ways=False)
     beat_s = np.arange(int(rng.integers(3, 7))) * 0.5
+    last_beat = len(beat_s) - 1
+    style = rng.integers(0, 2, 4)[graph.clip_index]
     pins = []
-    for i in range(int(rng.integers(1, 5))):
-        first = int(rng.integers(len(beat_s) - 1))
-        last = min(first + int(rng.integers(1, 3)), len(beat_s) - 1)
-        wanted = graph.clip_index == rng.integers(3)
-        pins.append(Pin(f"pin {i}", first, last, wanted if rng.random() < 0.7 else ~wanted))
+    for i in range(int(rng.integers(1, 7))):
+        first = int(rng.integers(last_beat))
+        last = min(first + int(rng.integers(1, 4)), last_beat)
+        clip = graph.clip_index == rng.integers(4)
+        kind = ("label", "not", "style", "pose")[int(rng.integers(4))]
+        wanted = {"label": clip, "not": ~clip, "style": style == rng.integers(2), "pose": np.ones(n, bool)}[kind]
+        pin = Pin(f"{kind} {i}", first, last, wanted)
+        if kind == "pose":
+            near = np.where(rng.random(n) < 0.4, rng.random(n), np.inf)
+            at = last_beat if rng.random() < 0.3 else first
+            first = min(at, last_beat - 1)
+            pin = Pin(f"pose {i}", first, first + 1, wanted, pose_steps(graph, at, near, last_beat))
+        pins.append(pin)
     return graph, beat_s, pins
 
 
-@pytest.mark.parametrize("seed", range(200))
-def test_kept_or_the_fewest_that_cannot_be(seed, make_graph):
+@pytest.fixture
+def kept_dances(every_dance):
+    """All dances that keep pins, with their costs; a pin is checked step by step, not by masks."""
+
+    def find(graph, beat_s, pins, costs):
+        kept = []
+        for cost, _, moves in every_dance(graph, beat_s, costs, range(len(graph.clip_index))):
+            price = 0.0
+            for pin in pins:
+                for beat, node, kind in moves:
+                    touches = beat < pin.last and beat + STEPS[kind][1] > pin.first
+                    price += 0.0 if not touches or pin.nodes[node] else np.inf
+                    price += pin.steps[beat, kind][node] if (beat, kind) in pin.steps else 0.0
+            if np.isfinite(price):
+                kept.append((cost + price, moves))
+        return kept
+
+    return find
+
+
+@pytest.mark.parametrize("seed", range(220))
+def test_kept_or_the_fewest_that_cannot_be(seed, make_graph, kept_dances):
     graph, beat_s, pins = random_case(seed, make_graph)
     reach = reach_of(graph, beat_s)
-    if not reach.is_danceable:
-        assert not is_kept(graph, beat_s, [], reach.bounds)
-        return
-    assert reach.keeps(pins) == is_kept(graph, beat_s, pins, reach.bounds)
+    if reach.bounds != NO_USAGE.hard_ratio:
+        pytest.skip("this seed's song cannot be danced within the bounds")
+    costs = PathCosts(usage=0.0, stay=1.5, stay_beats=3)
+    kept = kept_dances(graph, beat_s, pins, costs)
+    assert reach.keeps(pins) == bool(kept)
     conflict = find_conflict(reach, pins)
     if conflict is None:
         mask = admitted(pins, len(beat_s) - 1, len(graph.clip_index))
-        path = find_path(graph, beat_s, costs=NO_USAGE, starts="any", admissible=mask)
-        for beat, span, node in zip(path.beat_index, path.beat_span, path.source_node, strict=True):
-            assert mask[beat : beat + span, node].all()
+        path = find_path(
+            graph, beat_s, costs=costs, starts="any", admissible=mask, step_price=step_price(pins), strict=True
+        )
+        assert path.total_cost == pytest.approx(min(cost for cost, _ in kept))
+        kinds = [STEPS.index(step) for step in zip(path.motion_span.tolist(), path.beat_span.tolist(), strict=True)]
+        moves = list(zip(path.beat_index.tolist(), path.source_node.tolist(), kinds, strict=True))
+        assert moves in [moves for _, moves in kept]
         return
-    assert not is_kept(graph, beat_s, [pins[i] for i in conflict.pin_index], reach.bounds)
+    assert not kept_dances(graph, beat_s, [pins[i] for i in conflict.pin_index], costs)
     for size in range(len(conflict.pin_index)):
         for chosen in combinations(range(len(pins)), size):
-            assert is_kept(graph, beat_s, [pins[i] for i in chosen], reach.bounds)
+            assert kept_dances(graph, beat_s, [pins[i] for i in chosen], costs)
 
 
-def test_conflicts_really_happen(make_graph):
-    """The cases above hold both: sets that are kept, and conflicts of one, of two and of more pins."""
-    sizes = set()
-    for seed in range(200):
+def test_the_cases_hold_all_kinds(make_graph):
+    """Sets that are kept, conflicts of one, of two and of more pins; poses among both; half- and double-time danced."""
+    sizes, kinds, strides = set(), set(), set()
+    for seed in range(220):
         graph, beat_s, pins = random_case(seed, make_graph)
         reach = reach_of(graph, beat_s)
-        if reach.is_danceable:
-            conflict = find_conflict(reach, pins)
-            sizes.add(0 if conflict is None else len(conflict.pin_index))
-    assert {0, 1, 2} <= sizes
+        if reach.bounds != NO_USAGE.hard_ratio:
+            continue
+        conflict = find_conflict(reach, pins)
+        size = 0 if conflict is None else len(conflict.pin_index)
+        sizes.add(size)
+        kinds |= {(pin.name.split()[0], size > 0) for pin in pins}
+        if conflict is None:
+            mask = admitted(pins, len(beat_s) - 1, len(graph.clip_index))
+            path = find_path(graph, beat_s, costs=NO_USAGE, starts="any", admissible=mask, step_price=step_price(pins))
+            strides |= set(zip(path.motion_span.tolist(), path.beat_span.tolist(), strict=True))
+    assert {0, 1, 2, 3} <= sizes
+    assert kinds == {(kind, is_refused) for kind in ("label", "not", "style", "pose") for is_refused in (True, False)}
+    assert strides == set(STEPS)
 
 
 @pytest.fixture

@@ -45,15 +45,29 @@ def test_a_chorus_is_danced_again(joined):
     np.testing.assert_array_equal(node_of_interval(again)[k], node_of_interval(first)[k])
 
 
-def test_pins_come_first(joined):
+@pytest.mark.parametrize("first", [30, 10])
+def test_pins_come_first_and_come_again(joined, first):
+    """What is pinned in the one part is shown in the other too, wherever of the two it is pinned."""
     graph, reach = joined
-    wish = Pin("there", 30, 33, np.arange(120) // 30 == 2)
-    first = danced(graph, [wish])
-    pins, n_held = structure_pins(first, [CHORUS], reach, kept=[wish])
+    wish = Pin("there", first, first + 3, np.arange(120) // 30 == 2)
+    once = danced(graph, [wish])
+    pins, n_held = structure_pins(once, [CHORUS], reach, kept=[wish])
+    assert n_held == 1
+    again = danced(graph, [wish, *pins])
+    for place in (10, 30):
+        assert (node_of_interval(again)[place : place + 3] // 30 == 2).all()
+    assert same(again).all()
+
+
+def test_pins_against_each_other_are_left_to_themselves(joined):
+    graph, reach = joined
+    wishes = [Pin("a", 30, 33, np.arange(120) // 30 == 2), Pin("b", 10, 13, np.arange(120) // 30 == 1)]
+    pins, n_held = structure_pins(danced(graph, wishes), [CHORUS], reach, kept=wishes)
     assert n_held == 1
     assert not {30, 31, 32, 10, 11, 12} & {pin.first for pin in pins}
-    again = danced(graph, [wish, *pins])
+    again = danced(graph, [*wishes, *pins])
     assert (node_of_interval(again)[30:33] // 30 == 2).all()
+    assert (node_of_interval(again)[10:13] // 30 == 1).all()
 
 
 def test_what_cannot_be_danced_again_is_left(make_graph):

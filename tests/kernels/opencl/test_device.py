@@ -1,7 +1,15 @@
 import pytest
 
 from kernels.opencl import device
-from kernels.opencl.device import NoDeviceError, describe_devices, list_devices, pick_device
+from kernels.opencl.device import (
+    NoDeviceError,
+    build,
+    describe_devices,
+    list_devices,
+    only_device,
+    pick_device,
+    real_type,
+)
 
 pytestmark = pytest.mark.opencl
 
@@ -66,3 +74,22 @@ def test_real_devices_are_described_in_their_order():
         assert info.kind in ("GPU", "CPU", "other")
         assert info.memory_bytes > 0
         assert pick_device(info.index).name.strip() == info.name
+
+
+@pytest.mark.parametrize("real", list_devices(), ids=str)
+def test_kernels_are_built_with_their_constants_or_the_compiler_says_why(real):
+    context = device.cl.Context([real])
+    assert only_device(context) == real
+    built = build(context, ["pose_distance.cl"], {"ROWS": 8, "LANES": 4}, flags=["-w"])
+    assert [kernel.function_name for kernel in built.all_kernels()] == ["pose_distance"]
+    with pytest.raises(device.cl.RuntimeError, match="BUILD_PROGRAM_FAILURE"):
+        build(context, ["pose_distance.cl"], {"ROWS": 8, "LANES": "nonsense"})
+
+
+def test_double_precision_is_refused_where_there_is_none():
+    class Plain:
+        name, double_fp_config = "Plain GPU ", 0
+
+    assert real_type(Plain(), "single") == "float32"
+    with pytest.raises(ValueError, match="want single on Plain GPU, got double"):
+        real_type(Plain(), "double")
