@@ -11,6 +11,7 @@ from kernels.music.notes import sorted_notes
 from kernels.synthetic import performance as made_up
 from pipelines import commands
 from pipelines.collection import freshness
+from pipelines.hmm_report import dance_notes
 from pipelines.resources import NoProgress, StudioFolder
 
 RULES = made_up.hidden_rules(seed=4)
@@ -225,6 +226,18 @@ def test_soft_pins_never_refuse(studio):
     assert outcome.status == 0, outcome.troubles
     assert [p["is_kept"] for p in outcome.facts["pins"]] == [False]
     assert outcome.facts["costs"]["wish"] > 0
+
+
+def test_what_is_not_as_wanted_has_a_reason():
+    def notes(**failed):
+        return dance_notes({"wanted": {name: {"value": v, "is_passed": False} for name, v in failed.items()}})
+
+    assert notes() == []
+    assert "nothing to better" in notes(seam_jerk_ratio=1.2)[0]
+    assert "join only roughly" in notes(seam_jerk_ratio=1.7)[0]
+    assert "join only roughly" in notes(seam_jerk_worst_ratio=2.3)[0]
+    assert "stand differently" in notes(knee_pop_ratio=1.3)[0]
+    assert "too short" in notes(beat_p_probability=0.2)[0]
 
 
 def test_temperature_is_bounded(studio):
