@@ -56,12 +56,12 @@ def dance_notes(report: dict[str, Any]) -> list[str]:
         )
     if any(_failed(wanted, name) and wanted[name]["value"] > 1.5 for name in _ROUGH):
         notes.append(
-            "of the recordings that fit its beats some join only roughly: rough themselves there, or calm beside a wilder "
+            "of the recordings that fit its beats some join only roughly: rough themselves, or calm beside a wilder "
             "one; add clips danced near its tempo"
         )
     if any(_failed(wanted, name) for name in ("added_foot_slide_cm_per_s", "knee_pop_ratio")):
         notes.append(
-            "recordings that fit its beats stand differently where they meet: feet or knees give way in the blends; add "
+            "recordings that fit its beats stand differently where they meet: feet or knees give way there; add "
             "clips danced near its tempo"
         )
     return notes
