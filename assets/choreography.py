@@ -89,9 +89,10 @@ def choreography(
         known = catalogue(graph, clip_ids, clips, asked.allow, poses=poses_of(canonical_pose, settings))
         feature, repeat = music_feature.read(song_id), music_repeat.read(song_id)
         danced = by_graph(known, heard_song(grid, duration_s, feature=feature, repeat=repeat), settings, asked)
-    elif asked.wishes:
+    elif method == "matching" and asked.wishes:
         raise dg.Failure(
-            f"{song_id}: pins are kept by the graph method alone; dance it with --method graph", allow_retries=False
+            f"{song_id}: pins are kept by the methods graph and hmm; dance it with --method graph or --method hmm",
+            allow_retries=False,
         )
     elif method == "hmm":
         dancer = load_dancer(
@@ -100,7 +101,7 @@ def choreography(
             key_pose,
             {p.clip_id for p in to_performances(performance.read())},
             read_clips([clip.read(session) for session in clip.keys]),
-            allow=asked.allow,
+            asked=asked,
             settings=settings,
         )
         drums, tune = percussion.read(song_id), melody.read(song_id)
@@ -110,10 +111,10 @@ def choreography(
                 dancer,
                 drums,
                 tune,
-                beat_s,
-                duration_s,
+                heard_song(grid, duration_s),
                 canonical_pose,
                 settings,
+                asked,
                 temperature=request.temperature,
                 seed=request.seed,
             )

@@ -43,9 +43,20 @@ class Song:
         return np.searchsorted(self.grid_s, self.beats.time_s - 1e-9)
 
 
+@dataclass(frozen=True)
+class Parts:
+    """What a method makes dances of, as sentences call it: the parts, and a sequence of them."""
+
+    many: str
+    way: str
+
+
+GRAPH_PARTS = Parts("beats", "way through the motion graph")
+
+
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """What pins can name of the nodes of a graph; (N,) texts each."""
+    """What pins can name of the nodes of a graph, or of recorded motions; (N,) texts each."""
 
     clip_id: NDArray[np.str_]
     label: NDArray[np.str_]
@@ -151,7 +162,12 @@ def _counted(wish: PinWish, unit: str, first: int, end: int, number: NDArray[np.
 
 
 def sentences(
-    conflict: Conflict, pins: Sequence[Pin], wishes: Sequence[PinWish], song: Song, nodes: Nodes
+    conflict: Conflict,
+    pins: Sequence[Pin],
+    wishes: Sequence[PinWish],
+    song: Song,
+    nodes: Nodes,
+    parts: Parts = GRAPH_PARTS,
 ) -> list[str]:
     """Say which pins cannot be kept, why, and what would help.
 
@@ -160,6 +176,7 @@ def sentences(
     conflict : Conflict of ``pins``
     pins, wishes : in the same order
     song, nodes : as the pins were made with
+    parts : what the dance is made of
 
     Returns
     -------
@@ -171,13 +188,13 @@ def sentences(
     reason = {
         "nothing": f"what is {_called(those[0])} may not be danced: its licence is not among those of 'allow'"
         if nodes.wished(those[0]).any() and not those[0].pose
-        else f"no clip with beats is {_called(those[0])}{_near(those[0], nodes)}",
-        "tempo": "what it wishes has no beats near enough to the song's tempo there (warp 0.80 to 1.25)"
+        else f"no clip with {parts.many} is {_called(those[0])}{_near(those[0], nodes)}",
+        "tempo": f"what it wishes has no {parts.many} near enough to the song's tempo there (warp 0.80 to 1.25)"
         if not those[0].pose
         else "no clip shows a pose near enough to it at the song's tempo there (warp 0.80 to 1.25)",
-        "start": "no way through the motion graph leads there in time, or from there to the end of the song",
+        "start": f"no {parts.way} leads there in time, or from there to the end of the song",
         "same_time": "each of them can be kept, but no clip is all of this at the same time",
-        "path": "each of them can be kept, but no way through the motion graph keeps them all"
+        "path": f"each of them can be kept, but no {parts.way} keeps them all"
         + _within([pins[i] for i in conflict.pin_index]),
     }[conflict.reason]
     ways = [way_out(way, pins, wishes, song) for way in conflict.ways_out]

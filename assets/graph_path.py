@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from assets import direction, licences, matching_tables, plots
 from assets.danced import Danced
-from assets.direction import DirectionError, Nodes
+from assets.direction import GRAPH_PARTS, DirectionError, Nodes, Parts
 from assets.direction import Song as SongBeats
 from assets.lineage import Stored
 from assets.partitions import alternative_number
@@ -22,7 +22,7 @@ from kernels.assembly.timing import blend_widths, cover, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts, intensity_price
 from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, to_choreography
-from kernels.graph.pins import Pin, Reach, admitted, find_conflict, step_price
+from kernels.graph.pins import Conflict, Pin, Reach, admitted, find_conflict, step_price
 from kernels.graph.program import StepPrice
 from kernels.graph.structure import structure_pins
 from kernels.graph.transitions import THRESHOLD
@@ -278,11 +278,16 @@ def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
             posed = to_pose_pins(asked.wishes, song, known.graph, known.clip_ids, known.poses, weight=weight)
         return [posed.get(wish.text) or direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:
-        facts = {
-            "conflict": dg.MetadataValue.json([str(error).partition(": ")[0]]),
-            "ways_out": dg.MetadataValue.json([]),
-        }
-        raise dg.Failure(str(error), metadata=facts, allow_retries=False) from error
+        raise place_failure(error) from error
+
+
+def place_failure(error: DirectionError) -> dg.Failure:
+    """Say that a pin names no place of the song, for a person and for a machine."""
+    facts: dict[str, Any] = {
+        "conflict": dg.MetadataValue.json([str(error).partition(": ")[0]]),
+        "ways_out": dg.MetadataValue.json([]),
+    }
+    return dg.Failure(str(error), metadata=facts, allow_retries=False)
 
 
 def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], asked: Direction, costs: PathCosts) -> None:
@@ -291,27 +296,29 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
     usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
     if not reach.is_danceable:
         return  # the search says why there is no dance at all
-    conflict = find_conflict(
-        reach,
-        usable,
-        choices=[
-            {name: nodes & known.is_allowed for name, nodes in known.nodes.instead_of(w).items()} for w in asked.wishes
-        ],
-    )
-    if conflict is None:
-        return
-    told = direction.sentences(conflict, usable, asked.wishes, song, known.nodes)
-    raise dg.Failure(
-        "; ".join(told),
-        metadata={
-            "conflict": dg.MetadataValue.json([asked.wishes[i].text for i in conflict.pin_index]),
-            "why": told[0],
-            "ways_out": dg.MetadataValue.json(
-                [direction.way_out(way, usable, asked.wishes, song) for way in conflict.ways_out]
-            ),
-        },
-        allow_retries=False,
-    )
+    choices = [{n: m & known.is_allowed for n, m in known.nodes.instead_of(wish).items()} for wish in asked.wishes]
+    conflict = find_conflict(reach, usable, choices=choices)
+    if conflict is not None:
+        raise conflict_failure(conflict, usable, asked, song, known.nodes)
+
+
+def conflict_failure(
+    conflict: Conflict,
+    pins: Sequence[Pin],
+    asked: Direction,
+    song: SongBeats,
+    nodes: Nodes,
+    parts: Parts = GRAPH_PARTS,
+) -> dg.Failure:
+    """Say which pins cannot be kept and what would help, for a person and, in the metadata, for a machine."""
+    told = direction.sentences(conflict, pins, asked.wishes, song, nodes, parts)
+    ways = [direction.way_out(way, pins, asked.wishes, song) for way in conflict.ways_out]
+    facts: dict[str, Any] = {
+        "conflict": dg.MetadataValue.json([asked.wishes[i].text for i in conflict.pin_index]),
+        "why": told[0],
+        "ways_out": dg.MetadataValue.json(ways),
+    }
+    return dg.Failure("; ".join(told), metadata=facts, allow_retries=False)
 
 
 def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:

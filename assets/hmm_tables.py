@@ -43,6 +43,11 @@ class ClipMotions:
     end_s: Float
     state: Int
 
+    def known(self) -> ClipMotions:
+        """Take the motions of a known kind."""
+        kept = self.state >= 0
+        return ClipMotions(self.start_s[kept], self.end_s[kept], self.state[kept])
+
 
 def to_motions(table: pa.Table) -> dict[str, ClipMotions]:
     """Unpack the motions of every clip, in the table's order."""

@@ -54,7 +54,20 @@ def dance_notes(report: dict[str, Any]) -> list[str]:
             "seams are within 1.5 of the clips' own jerk, but poses there are so alike that a plain cut is as smooth: "
             "blends have nothing to better"
         )
+    if any(_failed(wanted, name) and wanted[name]["value"] > 1.5 for name in _ROUGH):
+        notes.append(
+            "of the recordings that fit its beats some join only roughly: rough themselves, or calm beside a wilder "
+            "one; add clips danced near its tempo"
+        )
+    if any(_failed(wanted, name) for name in ("added_foot_slide_cm_per_s", "knee_pop_ratio")):
+        notes.append(
+            "recordings that fit its beats stand differently where they meet: feet or knees give way there; add "
+            "clips danced near its tempo"
+        )
     return notes
+
+
+_ROUGH = ("seam_jerk_ratio", "seam_jerk_worst_ratio", "seam_jerk_median_ratio")
 
 
 def _failed(wanted: dict[str, Any], name: str) -> bool:

@@ -37,7 +37,7 @@ CHOREOGRAPHY = Table(
         Column("diversity_cost", pa.float32(), "Cost of showing what the better dances of the song show."),
         Column("wish_cost", pa.float32(), "Cost of soft wishes that are not kept."),
         Column("state_index", pa.int32(), "Basic motion danced, by the model; -1 in other methods."),
-        Column("model_cost", pa.float32(), "Minus log probability of the motion and its length after the one before."),
+        Column("model_cost", pa.float32(), "Minus log probability of the motion after the one before."),
         Column("music_cost", pa.float32(), "Minus log likelihood of the music heard during the motion."),
     ),
 )

@@ -52,6 +52,8 @@ TESTED_ELSEWHERE = {
     "assets/matching.py",
     "assets/hmm.py",
     "assets/hmm_path.py",
+    "assets/hmm_pins.py",  # in tests/pipelines/test_hmm.py
+    "assets/hmm_recordings.py",
     "assets/motion.py",
     "assets/search.py",
     "assets/music.py",

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,6 +138,20 @@ def admitted(pins: Sequence[Pin], n_intervals: int, n_nodes: int) -> Mask:
     return mask
 
 
+class Danceable(Protocol):
+    """What tells whether pins can be kept; pins count in music intervals."""
+
+    n_intervals: int
+
+    def keeps(self, pins: Sequence[Pin]) -> bool:
+        """Whether some dance of the whole song keeps all of these."""
+        ...
+
+    def fits(self, pin: Pin) -> bool:
+        """Whether each interval of a pin has something that is admitted and in tempo, reached or not."""
+        ...
+
+
 def step_price(pins: Sequence[Pin]) -> StepPrice:
     """Sum what single steps pay for pins."""
     found: dict[tuple[int, int], Float] = {}
@@ -229,13 +244,13 @@ class Reach:
 
 
 def find_conflict(
-    reach: Reach, pins: Sequence[Pin], *, choices: Sequence[Mapping[str, Mask]] | None = None
+    reach: Danceable, pins: Sequence[Pin], *, choices: Sequence[Mapping[str, Mask]] | None = None
 ) -> Conflict | None:
     """Find the fewest pins that cannot be kept together, and what would help.
 
     Parameters
     ----------
-    reach : Reach of a song that can be danced without pins
+    reach : Danceable, of a song that can be danced without pins
     pins : as the director gave them
     choices : for each pin, other wishes to try in its place, by name: (N,) bool; the first that does is taken
 
@@ -270,7 +285,7 @@ def find_conflict(
     return Conflict(smallest, _reason(reach, [pins[i] for i in smallest]), _ways_out(reach, pins, smallest, choices))
 
 
-def _reason(reach: Reach, pins: Sequence[Pin]) -> str:
+def _reason(reach: Danceable, pins: Sequence[Pin]) -> str:
     if len(pins) > 1:
         meet = range(max(pin.first for pin in pins), min(pin.last for pin in pins))
         is_empty = any(not np.all([pin.sources(k) for pin in pins], axis=0).any() for k in meet)
@@ -281,7 +296,7 @@ def _reason(reach: Reach, pins: Sequence[Pin]) -> str:
 
 
 def _ways_out(
-    reach: Reach, pins: Sequence[Pin], conflict: tuple[int, ...], choices: Sequence[Mapping[str, Mask]] | None
+    reach: Danceable, pins: Sequence[Pin], conflict: tuple[int, ...], choices: Sequence[Mapping[str, Mask]] | None
 ) -> tuple[WayOut, ...]:
     """Try to move each conflicting pin, nearest beats first, and to ask for something else there."""
     found: list[WayOut] = []

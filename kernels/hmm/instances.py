@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.hmm.durations import EASY_WARP, LEAST_WARP, MOST_WARP
+from kernels.hmm.durations import EASY_WARP
 from kernels.matching.path import viterbi
 from kernels.types import Float, Int
 
@@ -24,8 +24,8 @@ LONGEST_RUN = 16
 MOST_PRICED, MOST_EXCHANGES = 4, 4
 """A motion shown more often than that costs no more; steps are gone through so often."""
 
-VARIETY = 0.3
-"""Mean of what is added to costs at random when motions are shortlisted, so that not always the same few are."""
+MOST_LISTED = 128
+"""Motions of a step among which the second program chooses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,52 +59,53 @@ def warp_cost(span_s: Float, motion_s: Float) -> Float:
     return np.asarray((np.log(warp) / np.log(1.1)) ** 2 + np.where(easy, 0.0, HARD_COST), np.float64)
 
 
-def shortlist(motions: Motions, state: Int, span_s: Float, *, most: int = 24, seed: int = 0) -> list[Int]:
-    """Find motions for each step of a path: those that can be danced on end, and those nearest to their own pace.
+def shortlist(
+    motions: Motions,
+    fits: Sequence[Int],
+    own: Sequence[Float],
+    *,
+    seam: Float,
+    keep: Int | None = None,
+    most: int = MOST_LISTED,
+) -> list[Int]:
+    """Shorten what each step of a path may be danced with: what can be danced on end, and what is cheapest by itself.
 
     Parameters
     ----------
     motions : Motions
-    state : (S,) int64, basic motion of each step
-    span_s : (S,) float, seconds of song each takes
+    fits : S arrays of motions, each increasing, none empty
+    own : S arrays, what each of them costs by itself
+    seam : (I,) float, >= 0
+        What seams at both ends of a motion cost by the motion itself (:func:`kernels.hmm.seams.own_cost`).
+    keep : (S,) int64, or None, a motion of each step that stays on its list
     most : int, >= 2
-    seed : int
-        Of the variety among motions that suit as well.
 
     Returns
     -------
-    S arrays of motions, each increasing, none empty
+    S arrays of motions, each increasing
 
     Raises
     ------
     ValueError
-        If a step has no motion within the warp bounds.
+        If a step has no motion.
     """
-    length = motions.end_s - motions.start_s
+    for step, here in enumerate(fits):
+        if not len(here):
+            raise ValueError(f"step {step}: want at least one motion, got none")
     after = motions.following
     before = np.full(len(after), -1, np.int64)
     before[after[after >= 0]] = np.flatnonzero(after >= 0)
-    fits = [np.flatnonzero(_fits(motions, length, s, t)) for s, t in zip(state.tolist(), span_s.tolist(), strict=True)]
-    if any(not len(f) for f in fits):
-        first = next(i for i, f in enumerate(fits) if not len(f))
-        raise ValueError(f"step {first}: no motion of state {state[first]} lasts about {span_s[first]:.2f} s")
-    ahead = _runs(fits[::-1], after, len(length))[::-1]
-    behind = _runs(fits, before, len(length))
+    ahead = _runs(fits[::-1], after, len(after))[::-1]
+    behind = _runs(fits, before, len(after))
     found = []
-    rng = np.random.default_rng(seed)
     for step, here in enumerate(fits):
-        cost = warp_cost(span_s[step], length[here]) + rng.exponential(VARIETY, len(here))
-        run = ahead[step] + behind[step]
-        by_run = np.lexsort((here, cost, -run))
-        by_pace = np.lexsort((here, cost))
-        picked = list(dict.fromkeys([*by_run[: most // 2].tolist(), *by_pace[:most].tolist()]))[:most]
-        found.append(np.sort(here[picked]))
+        cost = own[step] + seam[here]
+        by_run = np.lexsort((here, cost, -(ahead[step] + behind[step])))
+        by_cost = np.lexsort((here, cost))
+        first = [] if keep is None else np.flatnonzero(here == keep[step]).tolist()
+        picked = dict.fromkeys([*first, *by_run[: most // 2].tolist(), *by_cost[:most].tolist()])
+        found.append(np.sort(here[list(picked)[:most]]))
     return found
-
-
-def _fits(motions: Motions, length: Float, state: int, span_s: float) -> Int:
-    warp = span_s / length
-    return np.asarray((motions.state == state) & (warp >= LEAST_WARP) & (warp <= MOST_WARP))
 
 
 def _runs(fits: Sequence[Int], after: Int, n: int) -> list[Int]:

@@ -23,6 +23,7 @@ from kernels.types import Float, Int
 
 ALPHAS: tuple[float, ...] = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 N_FOLDS = 5
+SETTLING_STEPS = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,23 @@ class Model:
     def n_states(self) -> int:
         """Number of states, K."""
         return len(self.log_initial)
+
+    @property
+    def entropy_rate(self) -> float:
+        """How improbable the next motion is on average, natural log units a motion; 0 for no or one state.
+
+        Of a motion longer than others, a dance needs fewer; what each pays is to be set against this, else the longest
+        motions would always be the most probable.
+        """
+        if not self.n_states:
+            return 0.0
+        transition = np.exp(self.log_transition)
+        # The share of each motion in the long run: the mean over many steps, whatever rounds it goes in.
+        share, total = np.full(self.n_states, 1.0 / self.n_states), np.zeros(self.n_states)
+        for _ in range(SETTLING_STEPS):
+            share = share @ transition
+            total += share
+        return float(-(total / SETTLING_STEPS) @ (transition * self.log_transition).sum(axis=1))
 
     def log_likelihood(self, heard: Sequence[Float]) -> Float:
         """Log likelihood of what is heard, (n, M) of each stream, in each state: (n, K) float64.

@@ -11,6 +11,7 @@ from kernels.music.notes import sorted_notes
 from kernels.synthetic import performance as made_up
 from pipelines import commands
 from pipelines.collection import freshness
+from pipelines.hmm_report import dance_notes
 from pipelines.resources import NoProgress, StudioFolder
 
 RULES = made_up.hidden_rules(seed=4)
@@ -189,11 +190,54 @@ def test_a_performance_of_one_motion(tmp_path):
     assert "add" in text
 
 
-def test_pins_are_refused_and_say_where_they_are_kept(studio):
-    (studio / "songs" / "new.brief.toml").write_text('[[pin]]\nat = 1.0\nuntil = 2.0\nlabel = "spin"\n')
-    outcome = dance(studio, "new")
+def pinned(root, *pins):
+    return dance(root, "new", pins=pins)
+
+
+def test_pins_are_kept_and_named_by_the_steps_that_serve_them(studio):
+    (studio / "clips" / "sumire" / "short.bvh").write_bytes(
+        bvh.format(made_up.perform(RULES, n_motions=60, interval_s=INTERVAL_S, seed=8).clip)
+    )
+    outcome = pinned(studio, "6-9=clip:sumire-short", "15=not:performance")
+    assert outcome.status == 0, outcome.troubles
+    assert [p["is_kept"] for p in outcome.facts["pins"]] == [True, True]
+    steps = lake(studio).table("choreography", "new|hmm").to_pylist()
+    inside = [s for s in steps if s["song_end_s"] > 6.0 + 1e-6 and s["song_start_s"] < 9.0 - 1e-6]
+    assert {s["clip_id"] for s in inside} == {"sumire-short"}
+    assert {s["pin_id"] for s in inside} == {"6-9=clip:sumire-short"}
+    assert {s["pin_id"] for s in steps} == {None, "6-9=clip:sumire-short", "15=not:performance"}
+
+
+def test_pins_that_cannot_be_kept_are_refused_with_the_fewest_of_them(studio):
+    outcome = pinned(studio, "2=performance", "5=spin")
     assert outcome.status == 2
-    assert "--method graph" in outcome.facts["error"]
+    assert outcome.facts["conflict"] == ["5=spin"]
+    assert outcome.facts["ways_out"] == ["5=performance in place of 5=spin"]
+    outcome = pinned(studio, "2-4=performance", "3-6=not:performance", "8=performance")
+    assert outcome.facts["conflict"] == ["3-6=not:performance"]
+    outcome = pinned(studio, "900=performance")
+    assert outcome.status == 2
+    assert "want seconds within the song" in outcome.facts["error"]
+
+
+def test_soft_pins_never_refuse(studio):
+    (studio / "songs" / "new.brief.toml").write_text('pins = "soft"\n[[pin]]\nat = 1.0\nuntil = 2.0\nlabel = "spin"\n')
+    outcome = dance(studio, "new")
+    assert outcome.status == 0, outcome.troubles
+    assert [p["is_kept"] for p in outcome.facts["pins"]] == [False]
+    assert outcome.facts["costs"]["wish"] > 0
+
+
+def test_what_is_not_as_wanted_has_a_reason():
+    def notes(**failed):
+        return dance_notes({"wanted": {name: {"value": v, "is_passed": False} for name, v in failed.items()}})
+
+    assert notes() == []
+    assert "nothing to better" in notes(seam_jerk_ratio=1.2)[0]
+    assert "join only roughly" in notes(seam_jerk_ratio=1.7)[0]
+    assert "join only roughly" in notes(seam_jerk_worst_ratio=2.3)[0]
+    assert "stand differently" in notes(knee_pop_ratio=1.3)[0]
+    assert "too short" in notes(beat_p_probability=0.2)[0]
 
 
 def test_temperature_is_bounded(studio):

@@ -19,18 +19,29 @@ def test_what_goes_on_is_known():
     assert Motions(none, none, none.astype(float), none.astype(float)).following.tolist() == []
 
 
+def fits(states):
+    return [np.flatnonzero(motions().state == s) for s in states]
+
+
 def test_a_run_that_can_be_danced_on_end_is_on_the_list():
-    found = shortlist(motions(), np.array([0, 1, 0, 1]), np.full(4, 0.5), most=2)
+    here = fits([0, 1, 0, 1])
+    found = shortlist(motions(), here, [np.zeros(len(f)) for f in here], seam=np.zeros(8), most=2)
     assert 0 in found[0]
     assert 3 in found[3]
     assert all((motions().state[f] == s).all() for f, s in zip(found, [0, 1, 0, 1], strict=True))
 
 
-def test_beyond_the_warp_bounds_nothing_is_listed_and_a_step_without_any_is_refused():
-    found = shortlist(motions(), np.array([0]), np.array([0.77]), most=8)
-    assert found[0].tolist() == [4, 6]
-    with pytest.raises(ValueError, match="step 1: no motion of state 1"):
-        shortlist(motions(), np.array([0, 1]), np.array([0.5, 2.0]))
+def test_what_is_cheap_by_itself_is_on_the_list_and_what_is_to_be_kept():
+    alone = Motions(np.arange(4), np.zeros(4, np.int64), np.zeros(4), np.full(4, 0.5))
+    here, own, seam = [np.arange(4)], [np.array([0.0, 2.0, 1.0, 3.0])], np.array([5.0, 0.0, 0.0, 0.0])
+    assert shortlist(alone, here, own, seam=seam, most=2)[0].tolist() == [1, 2]
+    assert shortlist(alone, here, own, seam=seam, keep=np.array([0]), most=3)[0].tolist() == [0, 1, 2]
+
+
+def test_a_step_without_any_motion_is_refused():
+    none = np.zeros(0, np.int64)
+    with pytest.raises(ValueError, match="step 1: want at least one motion"):
+        shortlist(motions(), [*fits([0]), none], [np.zeros(4), np.zeros(0)], seam=np.zeros(8))
 
 
 def test_pace_costs():

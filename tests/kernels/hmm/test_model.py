@@ -109,3 +109,12 @@ def test_what_does_not_fit_is_refused():
         Model(np.log([0.5, 0.5]), np.log(np.full((2, 2), 0.5)), (np.log(np.full((2, 2), 0.5)),), ())
     with pytest.raises(ValueError, match="states throughout"):
         Model(np.log([0.5, 0.5]), np.zeros((1, 1)), (), ())
+
+
+def test_the_next_motion_is_as_improbable_as_the_rules_make_it():
+    half = Model(np.log([0.5, 0.5]), np.log([[0.5, 0.5], [0.5, 0.5]]), (), ())
+    assert half.entropy_rate == pytest.approx(np.log(2))
+    # Alternating states: a round of two is half the time in either, whatever it starts with.
+    sure = Model(np.log([0.5, 0.5]), np.log([[1e-12, 1 - 1e-12], [0.5, 0.5]]), (), ())
+    assert sure.entropy_rate == pytest.approx(2 / 3 * np.log(2), abs=0.01)
+    assert Model(np.zeros(1), np.zeros((1, 1)), (), ()).entropy_rate == 0
