@@ -34,8 +34,8 @@ from schemas.settings import DanceSettings, PathSettings, Settings
 SOFT_WISH = 1.0
 """Price of a beat that a soft wish would have otherwise: the document's, about that of a seam."""
 
-POSE_WEIGHT = 8.0
-"""Price of a pose as far as it may be from the one that is wished: several seams are made to come nearer."""
+POSE_WEIGHT_PER_M = 100.0
+"""Price of a pose a metre from the one that is wished, in the mean of its joints: some centimetres are worth a seam."""
 
 
 @dataclass(frozen=True)
@@ -274,8 +274,8 @@ def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
         if any(wish.pose for wish in asked.wishes):
             if known.poses is None:
                 raise ValueError("poses: want those of the clips where a pin wishes for one, got none")
-            weight = POSE_WEIGHT / known.poses.threshold
-            posed = to_pose_pins(asked.wishes, song, known.graph, known.clip_ids, known.poses, weight=weight)
+            where = (song, known.graph, known.clip_ids, known.poses)
+            posed = to_pose_pins(asked.wishes, *where, weight=POSE_WEIGHT_PER_M)
         return [posed.get(wish.text) or direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:
         raise place_failure(error) from error

@@ -103,15 +103,17 @@ class Poses:
 
         Returns
         -------
-        (len(wanted), T, N) float64, infinite for none
+        (len(wanted), 2, T, N) float64
+            Ratios, and roots of the distances in metres; infinite for none.
         """
-        found = np.full((len(wanted), *times.shape), np.inf)
+        found = np.full((len(wanted), 2, *times.shape), np.inf)
         for moved in self.read(clips):
             nodes = np.flatnonzero(np.asarray(of_node) == clips.index(moved.clip_id))
             row, at = np.nonzero(np.isfinite(times[:, nodes]))
             shown = _features(moved, np.clip(times[row, nodes[at]], 0.0, moved.duration_s))
             for i, pose in enumerate(wanted):
-                found[i, row, nodes[at]] = pose_ratio(pose, shown)[0]
+                found[i, 0, row, nodes[at]] = pose_ratio(pose, shown)[0]
+                found[i, 1, row, nodes[at]] = np.sqrt(pose_distance(pose.pose, shown.pose)[0])
         return found
 
 
@@ -126,7 +128,7 @@ def to_pose_pins(
     song : Song
     graph, clip_ids : the motion graph of N nodes, and its clips
     poses : Poses
-    weight : float, >= 0, price of a ratio of one
+    weight : float, >= 0, price of a metre
 
     Returns
     -------
@@ -168,27 +170,27 @@ class _Shown:
     threshold: float
     weight: float
 
-    def price(self, ratio: Float, shown_s: Float, is_usable: NDArray[np.bool_]) -> Float:
-        """Price of showing poses, (..., N), by ratios and moments; in each row the clip's own nearest is admitted."""
+    def price(self, apart: Float, shown_s: Float, is_usable: NDArray[np.bool_]) -> Float:
+        """Price of showing poses, (..., N), by ratios and metres (2, ..., N), and moments; one a row is its own."""
         clip, at_s = self.wish.pose_moment
         is_clip = np.array([name == clip for name in self.clip_ids] or [False])[self.graph.clip_index]
         off_s = np.where(is_clip & is_usable, np.abs(shown_s - at_s), np.inf)
         is_own = np.isfinite(off_s) & (off_s <= off_s.min(axis=-1, keepdims=True, initial=np.inf) + ON_TIME_S)
-        return pose_price(ratio, is_own, threshold=self.threshold, weight=self.weight)
+        return pose_price(apart[0], apart[1], is_own, threshold=self.threshold, weight_per_m=self.weight)
 
 
 def _pin(shown: _Shown, place: "_Moment", ratio: Float, times: Float, between: slice, last: int) -> Pin:
     """Make the pin of one wish; ``ratio`` and ``times`` of the nodes first, of steps over the moment in ``between``."""
     graph, text = shown.graph, shown.wish.text
     can_end = np.isin(np.arange(len(graph.time_s)), graph.next_node)
-    starting, ending = (shown.price(ratio[0], graph.time_s, can) for can in (graph.next_node >= 0, can_end))
+    starting, ending = (shown.price(ratio[:, 0], graph.time_s, can) for can in (graph.next_node >= 0, can_end))
 
     def steps_at(beat: int) -> StepPrice:
         return pose_steps(graph, beat, ending if beat == last else starting, last)
 
     steps = steps_at(place.beat) if not place.steps else {}
     if place.steps:
-        price = shown.price(ratio[between], times[between], np.isfinite(times[between]))
+        price = shown.price(ratio[:, between], times[between], np.isfinite(times[between]))
         steps = dict(zip(place.steps, price, strict=True))
     every = np.ones(len(graph.time_s), bool)
     return Pin(text, place.first, place.first + 1, every, steps, steps_at)
@@ -287,7 +289,7 @@ def shown_pose(
     frame = lineage.row(int(np.argmin(np.abs(lineage["time_s"].to_numpy() - moment_s))), named=True)
     shown_s = frame["clip_time_s"] + (moment_s - frame["time_s"]) / frame["warp_ratio"]
     name = mirrored(frame["clip_id"]) if frame["is_mirrored"] else frame["clip_id"]
-    ratio = poses.ratios([pose], [name], [0], np.array([[shown_s]]))[0, 0, 0]
+    ratio = poses.ratios([pose], [name], [0], np.array([[shown_s]]))[0, 0, 0, 0]
     own = beats.filter((pl.col("clip_id") == clip) & ~pl.col("is_mirrored") & pl.col("is_kept"))["time_s"].to_numpy()
     reach_s = max(np.abs(own - at_s).min(), np.diff(own).max(initial=0.0) / 2) if len(own) else 0.0
     is_own = name == clip and abs(shown_s - at_s) <= reach_s + 0.05
@@ -297,7 +299,7 @@ def shown_pose(
         every = list(dict.fromkeys(names))
         time_s = beats.filter("is_kept")["time_s"].to_numpy()[None]
         of_node = [every.index(name) for name in names]
-        is_kept = bool(ratio <= furthest_ratio(poses.ratios([pose], every, of_node, time_s)[0, 0], poses.threshold))
+        is_kept = bool(ratio <= furthest_ratio(poses.ratios([pose], every, of_node, time_s)[0, 0, 0], poses.threshold))
     still = [
         _features(moved, np.array([np.clip(time_s, 0.0, moved.duration_s)]), velocity_time_s=0.0).pose
         for moved, time_s in ((dance, moment_s), *((moved, at_s) for moved in poses.read([clip])))

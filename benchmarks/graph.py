@@ -30,6 +30,7 @@ import pyopencl as cl
 
 from kernels import rotation
 from kernels.graph import prune
+from kernels.graph.costs import PathCosts
 from kernels.graph.distance import Metric, pose_distance
 from kernels.graph.features import BeatFeatures, beat_features, concatenate_beats, default_weight
 from kernels.graph.nodes import BeatNodes, beat_nodes
@@ -187,11 +188,14 @@ def random_graph(n_nodes: int) -> MotionGraph:
 
 
 def paths(n_nodes: int, n_beats: int, repeats: int) -> dict[str, float]:
-    """Figures of the path, exact and with repetition spread."""
+    """Figures of the path, exact and with repetition spread, and exact with a price on short stays."""
     graph = random_graph(n_nodes)
     beat_s = np.cumsum(0.5 + 0.01 * np.random.default_rng(1).normal(size=n_beats + 1))
     exact_s, spread = median(repeats, lambda: find_path(graph, beat_s, rounds=0))
     whole_s, whole_spread = median(repeats, lambda: find_path(graph, beat_s))
+    stays = PathCosts(stay=4.0, stay_beats=4)
+    stay_s, stay_spread = median(repeats, lambda: find_path(graph, beat_s, costs=stays, rounds=0), time.process_time)
+    plain_s, _ = median(repeats, lambda: find_path(graph, beat_s, rounds=0), time.process_time)
     exact, spread_out = find_path(graph, beat_s, rounds=0), find_path(graph, beat_s)
     return {
         "path_node_count": len(graph.clip_index),
@@ -201,6 +205,9 @@ def paths(n_nodes: int, n_beats: int, repeats: int) -> dict[str, float]:
         "path_exact_spread_ratio": spread,
         "path_s": whole_s,
         "path_spread_ratio": whole_spread,
+        "path_exact_cpu_s": plain_s,
+        "path_exact_with_stays_cpu_s": stay_s,
+        "path_exact_with_stays_spread_ratio": stay_spread,
         "path_exact_total_score": exact.total_cost,
         "path_total_score": spread_out.total_cost,
     }

@@ -50,25 +50,27 @@ def furthest_ratio(ratio: Float, threshold: float) -> float:
     return float(known[min(N_NEAREST, len(known)) - 1])
 
 
-def pose_price(ratio: Float, is_own: Mask, *, threshold: float, weight: float) -> Float:
+def pose_price(ratio: Float, apart_m: Float, is_own: Mask, *, threshold: float, weight_per_m: float) -> Float:
     """Price of showing poses in place of the one that is wished.
 
     Parameters
     ----------
     ratio : (..., N) float, :func:`pose_ratio`, infinite for no pose
+    apart_m : (..., N) float, metres, root of the distance itself: a ratio favours quick moments over near ones
     is_own : (..., N) bool, admitted however far
     threshold : float, > 0
-    weight : float, >= 0, price of a ratio of one
+    weight_per_m : float, >= 0
 
     Returns
     -------
     (..., N) float64
-        ``weight`` times the ratio where it is below the threshold or :func:`furthest_ratio`, or the pose is its own;
-        infinite elsewhere.
+        ``weight_per_m`` times the distance where the ratio is below the threshold or :func:`furthest_ratio`, or the
+        pose is its own; infinite elsewhere.
     """
     limit = furthest_ratio(np.where(is_own, 0.0, ratio).ravel(), threshold)
     is_near = (ratio < threshold) | (ratio <= limit) if limit > threshold else ratio < threshold
-    return np.where((is_near | is_own) & np.isfinite(ratio), weight * np.where(np.isfinite(ratio), ratio, 0.0), np.inf)
+    is_shown = (is_near | is_own) & np.isfinite(ratio)
+    return np.where(is_shown, weight_per_m * np.where(is_shown, apart_m, 0.0), np.inf)
 
 
 def pose_steps(graph: MotionGraph, beat: int, price: Float, n_intervals: int) -> StepPrice:

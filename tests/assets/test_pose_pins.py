@@ -97,7 +97,7 @@ def test_the_pose_itself_is_free_and_others_pay_by_their_distance(graph, poses):
     assert price[3] == pytest.approx(0.0, abs=1e-9)  # the beat at 1.7 s
     near = np.flatnonzero(np.isfinite(price))
     assert 1 < len(near) < 20
-    assert (price[near] < poses.threshold).all()
+    assert (price[near] < 0.5).all()
     assert np.isinf(pin.steps[3, HALF]).all()
     dearer = pins("2=pose:day-a@1.7", song, graph, poses, weight=3.0).steps[4, ONE]
     np.testing.assert_allclose(dearer[near], 3 * price[near])

@@ -36,13 +36,13 @@ def test_how_far_a_pose_may_be():
 def test_prices():
     """Near ones by their distance, the own moment however far, and where there is neither the nearest."""
     none = np.zeros(4, bool)
-    ratio = np.array([0.0, 1.0, 2.0, np.inf])
-    np.testing.assert_array_equal(pose_price(ratio, none, threshold=2.0, weight=3.0), [0, 3, np.inf, np.inf])
+    ratio, apart_m = np.array([0.0, 1.0, 2.0, np.inf]), np.array([0.0, 0.1, 0.2, np.inf])
+    asked = {"threshold": 2.0, "weight_per_m": 10.0}
+    np.testing.assert_array_equal(pose_price(ratio, apart_m, none, **asked), [0, 1, np.inf, np.inf])
     own = np.array([False, False, True, False])
-    np.testing.assert_array_equal(pose_price(ratio, own, threshold=2.0, weight=3.0), [0, 3, 6, np.inf])
-    far = ratio + 9
-    np.testing.assert_array_equal(pose_price(far, none, threshold=2.0, weight=1.0), [9, 10, 11, np.inf])
-    np.testing.assert_array_equal(pose_price(far, own, threshold=2.0, weight=1.0), [np.inf, np.inf, 11, np.inf])
+    np.testing.assert_array_equal(pose_price(ratio, apart_m, own, **asked), [0, 1, 2, np.inf])
+    np.testing.assert_array_equal(pose_price(ratio + 9, apart_m, none, **asked), [0, 1, 2, np.inf])
+    np.testing.assert_array_equal(pose_price(ratio + 9, apart_m, own, **asked), [np.inf, np.inf, 2, np.inf])
 
 
 def test_steps_on_a_beat(make_graph):
