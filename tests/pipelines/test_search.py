@@ -81,6 +81,22 @@ def test_a_file_from_elsewhere_is_found_in_the_catalogue(searchable, tmp_path):
     assert (hit["clip_id"], hit["distance"]) == ("day-twist_2", 0.0)
 
 
+def test_a_part_begun_anywhere_is_found_where_it_lies(searchable, tmp_path):
+    text = (searchable / "clips" / "day" / "unsaid.bvh").read_text()
+    head, motion = text.split("MOTION")
+    lines = motion.strip().splitlines()
+    step_s = float(lines[1].split(":")[1])
+    first, end = round(5.3 / step_s), round(7.8 / step_s)
+    part = tmp_path / "part.bvh"
+    body = "\n".join([f"Frames: {end - first}", lines[1], *lines[2 + first : 2 + end]])
+    part.write_text(f"{head}MOTION\n{body}\n")
+    hit = ask(searchable, str(part), k=1)["hits"][0]
+    assert hit["clip_id"] == "day-unsaid"
+    assert hit["copy_apart_m"] < 0.01
+    # The move comes back every two seconds or so: wherever it is laid, it lies there exactly.
+    assert hit["end_s"] - hit["start_s"] == pytest.approx(2.5, abs=0.1)
+
+
 def test_a_file_of_the_studio_is_its_clip(searchable):
     by_path = ask(searchable, str(searchable / "clips" / "day" / "twist_2.bvh"))
     assert by_path["hits"] == ask(searchable, "day-twist_2")["hits"]
