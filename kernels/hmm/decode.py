@@ -36,7 +36,7 @@ MISSED_BEAT = 2.0
 CROWDED = 6.0
 """Price of a seam at the very start or end of the song: its blend has no room."""
 
-REPETITION = 0.5
+REPETITION = 0.25
 WINDOW, LOOK_AHEAD = 16, 12
 """Intervals that are danced at a time, and looked at beyond."""
 
