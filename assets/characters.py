@@ -12,7 +12,8 @@ from assets.lineage import Stored
 from assets.sources import Sources, Studio, brief_of, fingerprint, request_of
 from kernels.motion.contacts import find_contacts, foot_slide
 from kernels.skeleton import grounding, kinematics
-from kernels.skeleton.character import measure
+from kernels.skeleton.canonical import LEG_LENGTH_M
+from kernels.skeleton.character import leg_length_m, measure
 from kernels.skeleton.fit import fit
 from kernels.types import Clip, Float, Skeleton
 
@@ -115,7 +116,8 @@ def dress(dance: Clip, cast: Cast) -> tuple[Clip, dict[str, object]]:
     -------
     Clip on ``cast.figure``
     dict
-        The cast's facts, with slide of planted feet and depth below the floor at the character's own size.
+        The cast's facts, with slide of feet near the floor, what of it the dance in proportion does not have, and
+        depth below the floor, at the character's own size.
     """
     fitted = fit(dance, cast.figure)
     planted = find_contacts(
@@ -125,8 +127,13 @@ def dress(dance: Clip, cast: Cast) -> tuple[Clip, dict[str, object]]:
     )
     ankle, toes = _feet(fitted)
     lowest = min(float(ankle[..., 1].min()), float(toes[..., 1].min()))
+    ours, there = (
+        100 * foot_slide(*feet, planted, frame_rate_hz=dance.frame_rate_hz) for feet in (_feet(dance), (ankle, toes))
+    )
+    scale = leg_length_m(cast.figure) / LEG_LENGTH_M
     measures = {
-        "foot_slide_cm_per_s": round(100 * foot_slide(ankle, toes, planted, frame_rate_hz=dance.frame_rate_hz), 3),
+        "foot_slide_cm_per_s": round(there, 3),
+        "added_foot_slide_cm_per_s": round(there - scale * ours, 3),
         "penetration_cm": round(100 * max(-lowest, 0.0), 3),
     }
     return fitted, {**cast.facts, **measures}

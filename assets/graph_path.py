@@ -20,7 +20,7 @@ from assets.pose_pins import Poses, to_pose_pins
 from assets.sources import Studio, brief_of, request_of
 from kernels.assembly.timing import blend_widths, cover, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
-from kernels.graph.costs import PathCosts, intensity_price, weight_scale
+from kernels.graph.costs import PathCosts, intensity_price
 from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, to_choreography
 from kernels.graph.pins import Conflict, Pin, Reach, admitted, find_conflict, step_price
 from kernels.graph.program import StepPrice
@@ -33,6 +33,9 @@ from schemas.settings import DanceSettings, PathSettings, Settings
 
 SOFT_WISH = 1.0
 """Price of a beat that a soft wish would have otherwise: the document's, about that of a seam."""
+
+POSE_WEIGHT = 8.0
+"""Price of a pose as far as it may be from the one that is wished: several seams are made to come nearer."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
     """
     graph = known.graph
     costs = path_costs(settings.path)
-    pins = pins_of(known, song, asked, costs)
+    pins = pins_of(known, song, asked)
     if not known.is_allowed.any() and len(known.is_allowed):
         raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
     strength = strength_price(known, song, settings.path)
@@ -157,6 +160,7 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
             stretch_price=price if price.any() else None,
             interval_price=terms.interval_price if terms.interval_price.any() else None,
             step_price=terms.step_price,
+            from_any=terms.from_any,
         )
 
     found = find_alternatives(graph, asked.alternative, find=lambda price: find(price, terms.admissible))
@@ -195,11 +199,15 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """What is wished of a dance, for the search: (K, N) admitted, (K, N) priced, and prices of single steps."""
+    """What is wished of a dance, for the search: (K, N) admitted, (K, N) priced, and prices of single steps.
+
+    ``from_any`` says whether a pose is wished for at the start.
+    """
 
     admissible: NDArray[np.bool_]
     interval_price: Float
     step_price: StepPrice
+    from_any: bool
 
 
 def terms_of(
@@ -207,14 +215,15 @@ def terms_of(
 ) -> Terms:
     """Gather what a search is to keep and to pay; dg.Failure where pins conflict."""
     mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
+    from_any = any(pin.steps and pin.first == 0 for pin in pins)
     if not asked.is_soft:
         if pins:
             refuse_conflict(known, song, pins, asked, costs)
             mask = mask & admitted(pins, *mask.shape)
-        return Terms(mask, strength, step_price(pins))
+        return Terms(mask, strength, step_price(pins), from_any)
     soft = [replace(pin, steps=_softened(pin)) for pin in pins]
     price = strength + np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH) if pins else strength
-    return Terms(mask, price, step_price(soft))
+    return Terms(mask, price, step_price(soft), from_any)
 
 
 def _softened(pin: Pin) -> StepPrice:
@@ -258,14 +267,14 @@ def heard_song(
     return SongBeats(grid_s, beats, duration_s, intensity, repeats)
 
 
-def pins_of(known: Catalogue, song: SongBeats, asked: Direction, costs: PathCosts) -> list[Pin]:
+def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
     """Bring what is wished onto beats and nodes; dg.Failure where a pin names no place of the song."""
     try:
         posed: dict[str, Pin] = {}
         if any(wish.pose for wish in asked.wishes):
             if known.poses is None:
                 raise ValueError("poses: want those of the clips where a pin wishes for one, got none")
-            weight = costs.transition / weight_scale(known.graph, costs)
+            weight = POSE_WEIGHT / known.poses.threshold
             posed = to_pose_pins(asked.wishes, song, known.graph, known.clip_ids, known.poses, weight=weight)
         return [posed.get(wish.text) or direction.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:
@@ -353,10 +362,21 @@ def path_costs(settings: PathSettings) -> PathCosts:
     )
 
 
-def search(graph: MotionGraph, beat_s: Float, costs: PathCosts, **wanted: Any) -> Path:  # noqa: ANN401 - find_path's
-    """Find the path within the hard bounds from the first beat of a clip, else from any beat, else past bounds."""
+def search(
+    graph: MotionGraph,
+    beat_s: Float,
+    costs: PathCosts,
+    *,
+    from_any: bool = False,
+    **wanted: Any,  # noqa: ANN401 - find_path's
+) -> Path:
+    """Find the path within the hard bounds from the first beat of a clip, else from any beat, else past bounds.
+
+    Where ``from_any``, the first beat of a clip is not preferred: a pose is wished for at the start.
+    """
     reason: InfeasiblePathError | None = None
-    for starts, strict in (("first", True), ("any", True), ("first", False), ("any", False)):
+    each = ("any",) if from_any else ("first", "any")
+    for starts, strict in ((starts, strict) for strict in (True, False) for starts in each):
         try:
             return find_path(graph, beat_s, costs=costs, starts=starts, strict=strict, **wanted)  # type: ignore[arg-type]
         except InfeasiblePathError as error:

@@ -169,11 +169,11 @@ class _Shown:
     weight: float
 
     def price(self, ratio: Float, shown_s: Float, is_usable: NDArray[np.bool_]) -> Float:
-        """Price of showing poses, (..., N), by their ratios and the moments of their clips."""
+        """Price of showing poses, (..., N), by ratios and moments; in each row the clip's own nearest is admitted."""
         clip, at_s = self.wish.pose_moment
         is_clip = np.array([name == clip for name in self.clip_ids] or [False])[self.graph.clip_index]
         off_s = np.where(is_clip & is_usable, np.abs(shown_s - at_s), np.inf)
-        is_own = np.isfinite(off_s) & (off_s <= off_s.min(initial=np.inf) + ON_TIME_S)
+        is_own = np.isfinite(off_s) & (off_s <= off_s.min(axis=-1, keepdims=True, initial=np.inf) + ON_TIME_S)
         return pose_price(ratio, is_own, threshold=self.threshold, weight=self.weight)
 
 

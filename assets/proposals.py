@@ -178,7 +178,7 @@ def _solved(
     The first one is the search's own; those after it are tried for what the ones before cannot have.
     """
     graph, costs = known.graph, path_costs(settings)
-    pins = pins_of(known, song, asked, costs)
+    pins = pins_of(known, song, asked)
     terms = terms_of(known, song, pins, asked, costs, strength_price(known, song, settings))
     mask = np.ascontiguousarray(terms.admissible)
     every = np.flatnonzero(known.is_allowed)
@@ -187,7 +187,7 @@ def _solved(
         return
     wished: dict[str, Any] = {"interval_price": terms.interval_price, "step_price": terms.step_price}
     if settings.repeat == "structure" and song.repeats:
-        best = search(graph, song.grid_s, costs, admissible=mask, **wished)
+        best = search(graph, song.grid_s, costs, admissible=mask, from_any=terms.from_any, **wished)
         own, _ = structure_pins(best, song.repeats, reach, kept=[] if asked.is_soft else pins)
         free = _shown_with(place, song)
         mask = mask & admitted([pin for pin in own if pin.first not in free], *mask.shape)
@@ -204,7 +204,8 @@ def _solved(
             outside_price=price,
             **wished,
         )
-        for starts in (np.intersect1d(first_beats(graph), every), every):
+        first = [] if terms.from_any else [np.intersect1d(first_beats(graph), every)]
+        for starts in (*first, every):
             proposals = Proposals(program, starts)
             if is_begun or np.isfinite(proposals.best_cost):
                 is_begun = True

@@ -26,6 +26,7 @@ from assets.lineage import (
 )
 from assets.partitions import EVERY, SESSION
 from assets.sources import Studio
+from kernels.search.aligned import track
 from kernels.search.encoder import Encoder, from_arrays
 from kernels.search.measure import leave_one_out
 from kernels.search.nearest import propose
@@ -40,10 +41,11 @@ _MOST_WINDOWS_A_CLIP = 4
 
 @dataclass(frozen=True, eq=False)
 class Index:
-    """The search index: its rows, and the vector of each, (N, 512) float32."""
+    """The search index: its rows, the vector of each, (N, 512), and the tracks of clips, (M, N_TRACK), both float32."""
 
     part: Part
     vector: NDArray[np.float32]
+    track: NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,7 @@ class _Example:
 @table_asset(
     MOTION_ENCODER,
     group="search",
-    code_version="1",
+    code_version="2",
     settings="search",
     keeps=True,
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose")},
@@ -138,7 +140,7 @@ def _windows(duration_s: float, settings: SearchSettings) -> Float:
 @table_asset(
     MOTION_EMBEDDING,
     group="search",
-    code_version="1",
+    code_version="2",
     settings="search.window_s search.longest_whole_s",
     partitions=SESSION,
 )
@@ -176,20 +178,21 @@ def motion_embedding(
 def _embedded(moved: tables.CanonicalClip, encoder: Encoder, settings: SearchSettings) -> pa.Table:
     cut = _windows(moved.duration_s, settings)
     vector = encoder.embed(moved.position_xyz_m, moved.frame_rate_hz, cut)
-    return search_tables.from_motion_embedding(moved.clip_id, cut, vector)
+    followed = track(moved.position_xyz_m, moved.frame_rate_hz)
+    return search_tables.from_motion_embedding(moved.clip_id, cut, vector, followed)
 
 
 @table_asset(
     MOTION_INDEX,
     group="search",
-    code_version="1",
+    code_version="2",
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "motion_embedding")},
     io_manager="index",
 )
 def motion_index(clip: Stored, motion_embedding: Stored, progress: dg.ResourceParam[Progress]) -> Index:
     """Put the windows of all clips in one row, to be searched at once."""
     progress.begin("indexing", len(motion_embedding.keys))
-    rows, vectors = search_tables.catalogue(
+    rows, vectors, tracks = search_tables.catalogue(
         (clip.read(key), motion_embedding.read(key)) for key in _each(motion_embedding.keys, progress)
     )
     start = search_tables.starts(rows["clip_id"])
@@ -207,7 +210,7 @@ def motion_index(clip: Stored, motion_embedding: Stored, progress: dg.ResourcePa
         "map": dg.MetadataValue.md(search_plots.catalogue_map(place, labels)),
         "confusion": dg.MetadataValue.md(search_plots.confusion(found)),
     }
-    return Index(Part("", table, metadata=metadata), vectors)
+    return Index(Part("", table, metadata=metadata), vectors, tracks)
 
 
 @table_asset(
@@ -218,7 +221,7 @@ def motion_index(clip: Stored, motion_embedding: Stored, progress: dg.ResourcePa
 )
 def label_proposal(clip: Stored, motion_embedding: Stored) -> Part:
     """Propose labels for the clips that clips.csv gives none, by their nearest labelled clips."""
-    rows, vectors = search_tables.catalogue(
+    rows, vectors, _ = search_tables.catalogue(
         (clip.read(key), motion_embedding.read(key)) for key in motion_embedding.keys
     )
     start = search_tables.starts(rows["clip_id"])

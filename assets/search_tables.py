@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from kernels.search.aligned import N_TRACK
 from kernels.search.discriminant import unit
 from kernels.search.nearest import Proposal
 from kernels.types import Float
@@ -38,8 +40,10 @@ def to_encoder(table: pa.Table) -> dict[str, NDArray[np.float32]]:
     }
 
 
-def from_motion_embedding(clip_id: str, window_s: Float, vector: NDArray[np.float32]) -> pa.Table:
-    """Pack the windows of a clip, (W, 2) seconds and (W, 512)."""
+def from_motion_embedding(
+    clip_id: str, window_s: Float, vector: NDArray[np.float32], track: NDArray[np.float32]
+) -> pa.Table:
+    """Pack the windows of a clip, (W, 2) seconds and (W, 512), and its track, (T, N_TRACK)."""
     w = len(window_s)
     columns = [
         pa.array([clip_id] * w, pa.string()),
@@ -47,6 +51,7 @@ def from_motion_embedding(clip_id: str, window_s: Float, vector: NDArray[np.floa
         pa.array(window_s[:, 0]),
         pa.array(window_s[:, 1]),
         pa.FixedSizeListArray.from_arrays(pa.array(vector.reshape(-1), pa.float32()), N_EMBEDDING),
+        pa.array([track.reshape(-1), *[track[:0].reshape(-1)] * (w - 1)], pa.list_(pa.float32())),
     ]
     return MOTION_EMBEDDING.check(pa.table(columns, schema=MOTION_EMBEDDING.arrow))
 
@@ -63,7 +68,18 @@ def starts(clip_id: Sequence[str]) -> NDArray[np.int64]:
     return np.flatnonzero(np.append(True, name[1:] != name[:-1])) if len(name) else np.zeros(0, np.int64)
 
 
-def catalogue(sessions: Iterable[tuple[pa.Table, pa.Table]]) -> tuple[dict[str, list[Any]], NDArray[np.float32]]:
+def to_tracks(table: pa.Table) -> dict[str, NDArray[np.float32]]:
+    """Unpack the tracks of a table of embeddings by clip, (T, N_TRACK) each."""
+    first = table.filter(pc.equal(table["window_index"], 0))
+    return {
+        clip_id: np.asarray(track.values, np.float32).reshape(-1, N_TRACK)
+        for clip_id, track in zip(first["clip_id"].to_pylist(), first["track_m"], strict=True)
+    }
+
+
+def catalogue(
+    sessions: Iterable[tuple[pa.Table, pa.Table]],
+) -> tuple[dict[str, list[Any]], NDArray[np.float32], NDArray[np.float32]]:
     """Join the embeddings of sessions with what is known of their clips.
 
     Parameters
@@ -72,23 +88,31 @@ def catalogue(sessions: Iterable[tuple[pa.Table, pa.Table]]) -> tuple[dict[str, 
 
     Returns
     -------
-    columns by name, N values each, and (N, 512) float32
+    columns by name, N values each, vectors (N, 512) float32, and tracks (M, N_TRACK) float32, a clip behind the other
         In order of clip and window; clips that are not read (any more) are left out.
     """
     rows: list[dict[str, Any]] = []
     vectors = [np.zeros((0, N_EMBEDDING), np.float32)]
+    track: dict[str, NDArray[np.float32]] = {}
     for clips, embedded in sessions:
         known = {row["clip_id"]: row for row in clips.to_pylist() if row["state"] == "read"}
-        plain = embedded.select([c for c in embedded.column_names if c != "embedding"]).to_pylist()
+        plain = embedded.select([c for c in embedded.column_names if c not in ("embedding", "track_m")]).to_pylist()
         is_kept = np.array([row["clip_id"] in known for row in plain], bool)
         rows += [{**known[row["clip_id"]], **row} for row in plain if row["clip_id"] in known]
         vectors.append(to_vectors(embedded)[is_kept])
+        track |= to_tracks(embedded)
     order = sorted(range(len(rows)), key=lambda i: (rows[i]["clip_id"], rows[i]["window_index"]))
     names = [c.name for c in MOTION_INDEX.columns if c.name not in _MADE_BY_INDEX]
-    return {name: [rows[i][name] for i in order] for name in names}, np.concatenate(vectors)[order]
+    found = {name: [rows[i][name] for i in order] for name in names}
+    clips = list(dict.fromkeys(found["clip_id"]))
+    count = np.array([len(track[c]) for c in clips], np.int64)
+    of = np.unique(np.asarray(found["clip_id"], str), return_inverse=True)[1]
+    found |= {"track_index": (np.cumsum(count) - count)[of].tolist(), "track_count": count[of].tolist()}
+    tracks = np.concatenate([np.zeros((0, N_TRACK), np.float32), *(track[c] for c in clips)])
+    return found, np.concatenate(vectors)[order], tracks
 
 
-_MADE_BY_INDEX = ("row_index", "row_key", "map_x_score", "map_y_score")
+_MADE_BY_INDEX = ("row_index", "row_key", "track_index", "track_count", "map_x_score", "map_y_score")
 
 
 def clip_vectors(vector: NDArray[np.float32], start: NDArray[np.int64]) -> NDArray[np.float32]:

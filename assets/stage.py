@@ -51,7 +51,7 @@ class Stage:
 @table_asset(
     USD_ANIMATION,
     group="dance",
-    code_version="3",
+    code_version="4",
     sources="character",
     partitions=DANCE,
     ins={name: _EVERY_CLIP for name in ("clip", "skeleton", "pose")},

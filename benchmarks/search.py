@@ -3,9 +3,10 @@
 Clips are those of ``bvh_labelled`` of the real test data with their ``content`` labels. Splits: by *take* (a quarter of
 the takes held out, four times) and by *style* (whole styles held out, five times: whoever was asked to move in another
 way is unseen). What is held out is looked up among the rest, which is also what was trained on. ``--queries FOLDER``
-looks clips of another folder (BVH with a labels*.csv) up among all.
+looks clips of another folder (BVH with a labels*.csv) up among all, or among those of ``--database FOLDER``.
 
-    python benchmarks/search.py [--json] [--only accuracy|sameness|speed] [--splits N] [--queries FOLDER]
+    python benchmarks/search.py [--json] [--only accuracy|sameness|speed|unseen] [--splits N]
+                                [--queries FOLDER] [--database FOLDER]
 """
 
 import argparse
@@ -17,7 +18,7 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,12 +29,13 @@ from search_baselines import mean_and_deviation, warped
 from assets.formats import bvh
 from kernels import rotation
 from kernels.search import fit, network, train
+from kernels.search.aligned import MOST_FRAMES, N_TRACK, QUERY_HZ, Alignment, align, room, track
 from kernels.search.augment import Augmentation
 from kernels.search.discriminant import principal, unit
 from kernels.search.document import train_document
 from kernels.search.encoder import Encoder
 from kernels.search.measure import Retrieval, group_folds, joined, label_folds, retrieval
-from kernels.search.nearest import nearest_clips
+from kernels.search.nearest import Copies, Hit, nearest_clips
 from kernels.search.normalise import channels, resample
 from kernels.search.windows import windows
 from kernels.skeleton.canonical import CANONICAL
@@ -43,7 +45,7 @@ from kernels.synthetic.rigs import RigPlan, a_pose, author, splayed
 from kernels.types import Clip
 
 DATA = Path(os.environ.get("ODORI_TEST_DATA", Path(__file__).parents[2] / "shared" / "data"))
-LONGEST_S = 6.0
+LONGEST_S = 8.0
 Distances = NDArray[np.floating]
 
 
@@ -166,15 +168,41 @@ def default(clips: list[Labelled]) -> tuple[Encoder, float]:
     return fitted.encoder, time.process_time() - begun
 
 
+class Catalogue:
+    """Clips embedded and followed, to be searched as the command does: by windows, copies first."""
+
+    def __init__(self, clips: list[Labelled], encoder: Encoder) -> None:
+        self.encoder = encoder
+        self.vector, self.start = embedded(encoder, clips)
+        self.tracks = [track(clip.motion.position_xyz_m, clip.frame_rate_hz) for clip in clips]
+
+    def search(self, query: Labelled, k: int) -> list[Hit]:
+        """Find the clips most like another."""
+        looked_for = track(query.motion.position_xyz_m, query.frame_rate_hz, rate_hz=QUERY_HZ)
+        vector = embedded(self.encoder, [query])[0]
+        return nearest_clips(self.vector, self.start, vector, k=k, copies=copies_among(self.tracks, looked_for))
+
+
+def copies_among(tracks: Sequence[NDArray[np.float32]], looked_for: NDArray[np.float32]) -> Copies:
+    """Lay a query over as many of the nearest as the command does."""
+    count = np.array([len(each) for each in tracks])
+
+    def copies(near: NDArray[np.int64]) -> list[Alignment]:
+        n = max(int((np.cumsum(room(looked_for, count[near])) <= MOST_FRAMES).sum()), 1)
+        return align(looked_for, [tracks[c] for c in near[:n].tolist()])
+
+    return copies
+
+
 def unseen(clips: list[Labelled], queries: list[Labelled], encoder: Encoder) -> dict[str, Retrieval]:
-    """Look other clips up among all, as the command does: by windows."""
+    """Look other clips up among all, as the command does."""
     asked, known = [q.label for q in queries], [c.label for c in clips]
     whole, other = [c.window for c in clips], [q.window for q in queries]
     described, of = mean_and_deviation(whole), mean_and_deviation(other)
-    vector, start = embedded(encoder, clips)
+    catalogue = Catalogue(clips, encoder)
     distance = np.full((len(queries), len(clips)), np.inf)
     for row, query in enumerate(queries):
-        for hit in nearest_clips(vector, start, embedded(encoder, [query])[0], k=len(clips)):
+        for hit in catalogue.search(query, len(clips)):
             distance[row, hit.clip] = hit.distance
     return {
         "mean and deviation of the pose": retrieval(
@@ -196,15 +224,18 @@ def embedded(encoder: Encoder, clips: list[Labelled]) -> tuple[NDArray[np.float3
 
 def sameness(clips: list[Labelled], encoder: Encoder) -> dict[str, float]:
     """Share of clips whose copy, otherwise recorded, has the clip itself as its first hit."""
-    vector, start = embedded(encoder, clips)
-    made: dict[str, Callable[[Labelled, int], Labelled]] = {"rig": _other_rig, "rotated": _rotated, "shifted": _shifted}
+    catalogue = Catalogue(clips, encoder)
     shares = {}
-    for name, make in made.items():
-        right = 0
+    for name, make in COPIES.items():
+        right = placed = 0
         for number, clip in enumerate(clips):
-            hits = nearest_clips(vector, start, embedded(encoder, [make(clip, number)])[0], k=1)
-            right += hits[0].clip == number
+            hit = catalogue.search(make(clip, number), 1)[0]
+            right += hit.clip == number
+            if name == "part" and hit.clip == number and hit.copied:
+                placed += abs(hit.copied.start_s - _part(clip, number)[0] / clip.frame_rate_hz) < 0.1
         shares[f"{name}_first_ratio"] = right / len(clips)
+        if name == "part":
+            shares["part_placed_ratio"] = placed / len(clips)
     return shares
 
 
@@ -242,6 +273,40 @@ def _shifted(clip: Labelled, number: int) -> Labelled:
     return _moved(clip, clip.motion.position_xyz_m[first:])
 
 
+def _ended(clip: Labelled, number: int) -> Labelled:
+    """Cut a tenth of the clip off its end, at most half a second."""
+    cut = min(int(0.1 * len(clip.motion.position_xyz_m)), int(clip.frame_rate_hz / 2))
+    return _moved(clip, clip.motion.position_xyz_m[: len(clip.motion.position_xyz_m) - cut])
+
+
+def _part(clip: Labelled, number: int) -> tuple[int, int]:
+    """Choose 2 seconds of a clip, all of a shorter one: first frame and end."""
+    n = len(clip.motion.position_xyz_m)
+    long = min(int(2 * clip.frame_rate_hz) + 1, n)
+    first = int((number * 0.618034) % 1 * (n - long))
+    return first, first + long
+
+
+def _parted(clip: Labelled, number: int) -> Labelled:
+    first, end = _part(clip, number)
+    return _moved(clip, clip.motion.position_xyz_m[first:end])
+
+
+def _paced(clip: Labelled, number: int) -> Labelled:
+    """Play a clip a tenth faster or slower."""
+    return dataclasses.replace(clip, frame_rate_hz=clip.frame_rate_hz * (1.1 if number % 2 else 0.9))
+
+
+COPIES: dict[str, Callable[[Labelled, int], Labelled]] = {
+    "rig": _other_rig,
+    "rotated": _rotated,
+    "shifted": _shifted,
+    "ended": _ended,
+    "part": _parted,
+    "paced": _paced,
+}
+
+
 def speed(clips: list[Labelled], encoder: Encoder) -> dict[str, float]:
     """Embed all clips; search 50,000 windows mapped from disk."""
     begun = time.process_time()
@@ -253,11 +318,15 @@ def speed(clips: list[Labelled], encoder: Encoder) -> dict[str, float]:
         place = Path(folder) / "vectors.f32"
         vector.tofile(place)
         mapped = np.memmap(place, np.float32, "r", shape=(n, width))
+        followed = np.resize(np.concatenate(Catalogue(clips, encoder).tracks), (30 * n, N_TRACK))
+        tracks = followed.reshape(n, 30, N_TRACK)
         wall, cpu = [], []
         for k in range(30):
             query, start = vector[k : k + 1], np.arange(n)
+            moved = clips[k].motion.position_xyz_m, clips[k].frame_rate_hz
+            copies = copies_among(tracks, track(*moved, end_s=4.0, rate_hz=QUERY_HZ))
             begun, worked = time.perf_counter(), time.process_time()
-            nearest_clips(mapped, start, query, k=10)
+            nearest_clips(mapped, start, query, k=10, copies=copies)
             wall.append(1000 * (time.perf_counter() - begun))
             cpu.append(1000 * (time.process_time() - worked))
     return found | {
@@ -267,12 +336,23 @@ def speed(clips: list[Labelled], encoder: Encoder) -> dict[str, float]:
     }
 
 
+def _some(folder: Path) -> list[Labelled]:
+    """Read a folder of which something has to come."""
+    clips = list(read(folder))
+    if not clips:
+        raise SystemExit(f"{folder}: want BVH files that a labels*.csv there names, got none")
+    return clips
+
+
 def table(found: dict[str, dict[str, Retrieval]]) -> str:
     """Write measures as a Markdown table, one column a split."""
     heads = [f"{name}: 1-NN | mAP" for name in found]
     lines = [f"| method | {' | '.join(heads)} |", "|---|" + "---|---|" * len(found)]
-    for method in next(iter(found.values())):
-        cells = [f"{r[method].first_ratio:.3f} | {r[method].mean_precision_ratio:.3f}" for r in found.values()]
+    for method in dict.fromkeys(method for split in found.values() for method in split):
+        cells = [
+            f"{r[method].first_ratio:.3f} | {r[method].mean_precision_ratio:.3f}" if method in r else "– | –"
+            for r in found.values()
+        ]
         lines.append(f"| {method} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
@@ -281,11 +361,14 @@ def main() -> None:
     """Measure, and print a table or one JSON object."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--only", choices=("accuracy", "sameness", "speed"))
+    parser.add_argument("--only", choices=("accuracy", "sameness", "speed", "unseen"))
     parser.add_argument("--queries", type=Path, help="clips of another folder, looked up among all")
+    parser.add_argument("--database", type=Path, help="clips to look among, in place of bvh_labelled of the test data")
     parser.add_argument("--splits", type=int, default=5, help="splits of each kind at most; a split takes minutes")
     asked = parser.parse_args()
-    clips = list(read(DATA / "bvh_labelled"))
+    if asked.only == "unseen" and not asked.queries:
+        parser.error("--only unseen: want --queries FOLDER, got none; name a folder of BVH files with a labels*.csv")
+    clips = _some(asked.database or DATA / "bvh_labelled")
     figures: dict[str, float] = {"clips": len(clips)}
     tables: dict[str, dict[str, Retrieval]] = {}
     if asked.only in (None, "accuracy"):
@@ -293,7 +376,7 @@ def main() -> None:
     if asked.queries or asked.only in (None, "sameness", "speed"):
         encoder, figures["training_cpu_s"] = default(clips)
         if asked.queries:
-            tables = {"unseen": unseen(clips, list(read(asked.queries)), encoder)}
+            tables["unseen"] = unseen(clips, _some(asked.queries), encoder)
         if asked.only in (None, "sameness"):
             figures |= sameness(clips, encoder)
         if asked.only in (None, "speed"):
@@ -308,7 +391,7 @@ def main() -> None:
     if tables:
         print(table(tables))
     for name, value in figures.items():
-        if not name.endswith(("_first_ratio", "_map_ratio")) or name.split("_")[0] in ("rig", "rotated", "shifted"):
+        if not name.endswith(("_first_ratio", "_map_ratio")) or name.split("_")[0] in COPIES:
             print(f"{name}: {value:.4g}")
 
 

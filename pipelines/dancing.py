@@ -168,7 +168,8 @@ def report_of(facts: dict[str, Any]) -> str:
         body = facts["character"]
         lines.append(
             f"  danced by {body.get('clip_id') or body['file']}, {body['scale_ratio']:.2f} of our legs: feet slide "
-            f"{body['foot_slide_cm_per_s']:.1f} cm/s, {body['penetration_cm']:.1f} cm below the floor at most"
+            f"{body['added_foot_slide_cm_per_s']:+.1f} cm/s beyond ours, at most {body['penetration_cm']:.1f} cm "
+            "below the floor"
         )
     lines.append(f"  licence {facts['licence']['name']}: {facts['licence']['sentence']}")
     lines += [

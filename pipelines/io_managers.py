@@ -133,7 +133,7 @@ class IndexIOManager(LakeIOManager):
         if not isinstance(obj, Index):
             raise TypeError(f"motion_index: want an Index, got {type(obj).__name__}")
         try:
-            said = motion_index.write_vectors(self._folder, obj.part.table, obj.vector)
+            said = motion_index.write_vectors(self._folder, obj.part.table, obj.vector, obj.track)
         except OSError as error:
             raise LakeError(f"{self._folder}: cannot be written: {why(error)}") from error
         table = MOTION_INDEX.with_metadata(obj.part.table, said)

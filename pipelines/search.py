@@ -22,12 +22,13 @@ from assets.formats import bvh, motion_index
 from assets.formats.errors import FormatError
 from assets.formats.motion_index import StoredIndex
 from assets.formats.settings import read_settings
+from kernels.search.aligned import MOST_FRAMES, QUERY_HZ, Alignment, align, room, track
 from kernels.search.encoder import Encoder, from_arrays
-from kernels.search.nearest import Hit, nearest_clips, steer
+from kernels.search.nearest import Copies, Hit, nearest_clips, steer
 from kernels.search.windows import windows
 from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget
-from kernels.types import Float
+from kernels.types import Float, Int
 from pipelines.files import StudioError, write_beside
 from pipelines.outcome import DONE, Outcome
 from schemas.search import MOTION_EMBEDDING, MOTION_ENCODER, MOTION_INDEX
@@ -126,8 +127,9 @@ def search(
     for motion in (query, *like, *unlike):
         if motion is not None and motion.clip_id:
             is_allowed &= ~_overlap(index.rows, motion)
+    copies = _copies(catalogue, query) if query and not (like or unlike) else None
     begun = time.perf_counter()
-    found = _find(index, query, like, unlike, is_allowed, wish.k)
+    found = _find(index, query, like, unlike, is_allowed, wish.k, copies)
     took_s = time.perf_counter() - begun
     facts = {
         "query": wish.query,
@@ -178,6 +180,7 @@ def _find(
     unlike: Sequence[Motion],
     is_allowed: NDArray[np.bool_],
     k: int,
+    copies: Copies | None,
 ) -> list[Hit]:
     none = np.zeros((0, index.vector.shape[1]), np.float32)
     wanted = (
@@ -190,10 +193,31 @@ def _find(
     )
     start = _starts(index.rows["clip_id"])
     candidates = index.candidates if _is_approximate(index, is_allowed) else None
-    found = nearest_clips(index.vector, start, wanted, k=k, is_allowed=is_allowed, candidates=candidates)
+    found = nearest_clips(index.vector, start, wanted, k=k, is_allowed=is_allowed, candidates=candidates, copies=copies)
     if candidates is not None and len(found) < k:  # few of the near ones are allowed
-        found = nearest_clips(index.vector, start, wanted, k=k, is_allowed=is_allowed)
+        found = nearest_clips(index.vector, start, wanted, k=k, is_allowed=is_allowed, copies=copies)
     return found
+
+
+def _copies(catalogue: "_Catalogue", query: Motion) -> Copies:
+    """Prepare the search for copies of a motion; stretches of its own clip are none."""
+    index = catalogue.index
+    assert index is not None
+    start = _starts(index.rows["clip_id"])
+    first, count = (index.rows[name].to_numpy()[start] for name in ("track_index", "track_count"))
+    own = index.rows["clip_id"].take(pa.array(start)).to_pylist().index(query.clip_id) if query.clip_id else -1
+    poses = query.poses or catalogue.poses(query.clip_id, index.rows["session"][int(start[own])].as_py())
+    looked_for = track(*poses, start_s=query.start_s, end_s=query.end_s, rate_hz=QUERY_HZ)
+
+    def copies(clips: Int) -> list[Alignment]:
+        taken = clips[: max(int((np.cumsum(room(looked_for, count[clips])) <= MOST_FRAMES).sum()), 1)]
+        tracks = [index.track[first[c] : first[c] + count[c]] for c in taken.tolist()]
+        return [
+            Alignment(np.inf, 0.0, 0.0) if c == own else laid
+            for c, laid in zip(taken.tolist(), align(looked_for, tracks), strict=True)
+        ]
+
+    return copies
 
 
 def _is_approximate(index: StoredIndex, is_allowed: NDArray[np.bool_]) -> bool:
@@ -409,7 +433,11 @@ def _overlap(rows: pa.Table, motion: Motion) -> NDArray[np.bool_]:
 def _hit_facts(rows: pa.Table, hit: Hit) -> dict[str, Any]:
     row = rows.slice(hit.row, 1).to_pylist()[0]
     names = ("clip_id", "start_s", "end_s", "label", "style", "licence", "path")
-    return {name: row[name] for name in names} | {"distance": round(hit.distance, 6)}
+    facts = {name: row[name] for name in names} | {"distance": round(hit.distance, 6), "copy_apart_m": None}
+    if hit.copied:
+        stretch = {"start_s": round(hit.copied.start_s, 3), "end_s": round(min(hit.copied.end_s, row["duration_s"]), 3)}
+        facts |= stretch | {"copy_apart_m": round(hit.copied.distance_m, 4)}
+    return facts
 
 
 def _report(facts: dict[str, Any], wish: Wish) -> str:

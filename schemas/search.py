@@ -27,7 +27,7 @@ MOTION_ENCODER = Table(
 
 MOTION_EMBEDDING = Table(
     name="motion_embedding",
-    version=1,
+    version=2,
     meaning="One window of one clip as the vector it is searched by.",
     key=("clip_id", "window_index"),
     columns=(
@@ -36,14 +36,21 @@ MOTION_EMBEDDING = Table(
         START_S,
         END_S,
         Column("embedding", pa.list_(pa.float32(), N_EMBEDDING), "Unit vector; like motions lie close together."),
+        Column(
+            "track_m",
+            pa.list_(pa.float32()),
+            "Head, elbows, hands, knees and feet seen from the body, 27 numbers a frame at 7.5 Hz, of the whole clip; "
+            "it stands with the clip's first window and is empty with others.",
+        ),
     ),
 )
 
 MOTION_INDEX = Table(
     name="motion_index",
-    version=1,
+    version=2,
     meaning="One row of the search index: a window, and what a search may be narrowed by; its vector is the "
-    "same row of the file that the metadata names as `vectors`.",
+    "same row of the file that the metadata names as `vectors`; what joints "
+    "do stands in the file named as `tracks`.",
     key=("row_index",),
     columns=(
         Column("row_index", pa.int32(), "Row of the index, from 0, sorted by clip and window."),
@@ -59,6 +66,8 @@ MOTION_INDEX = Table(
         f.DURATION_S,
         f.PATH,
         Column("row_key", pa.int64(), "Window and vector as a number: a window embedded anew has another."),
+        Column("track_index", pa.int64(), "First frame of its clip among the tracks."),
+        Column("track_count", pa.int32(), "Frames of its clip's track."),
         Column("map_x_score", pa.float32(), "Place on the map of the catalogue; like motions lie close together."),
         Column("map_y_score", pa.float32(), "The map's other axis."),
     ),

@@ -169,7 +169,7 @@ class SearchSettings(_Checked):
 
     has_travel: bool = key(True, "Where the root goes and turns counts; false: a walk on the spot is a walk.")
     window_s: float = key(4.0, "Length of the windows long clips are searched by.", least=0.5, most=8)
-    longest_whole_s: float = key(6.0, "A clip no longer than this is one window.", least=0.5, most=16)
+    longest_whole_s: float = key(8.0, "A clip no longer than this is one window.", least=0.5, most=16)
     labels: str = key(
         "clips.csv",
         "What the encoder learns from: labels of 'clips.csv', 'folders' too, or 'none'.",

@@ -1,8 +1,8 @@
-"""The search index on disk: rows as Parquet, vectors as bare float32 that are mapped and never decoded.
+"""The search index on disk: rows as Parquet, vectors and tracks as bare float32 that are mapped and never decoded.
 
-``all.parquet`` names the files beside it in its metadata: ``vectors`` and, of a large catalogue, ``approximate``, an
-HNSW graph (Malkov and Yashunin 2018) as usearch writes it. Files are named by their content, so that a search going on
-while the index is renewed reads the old one to its end.
+``all.parquet`` names the files beside it in its metadata: ``vectors``, ``tracks`` and, of a large catalogue,
+``approximate``, an HNSW graph (Malkov and Yashunin 2018) as usearch writes it. Files are named by their content: a
+search going on while the index is renewed reads the old one to its end.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from assets.formats import beside
+from kernels.search.aligned import N_TRACK
 
 EXACT_UP_TO = 50_000
 ROWS = "all.parquet"
@@ -36,12 +37,14 @@ class StoredIndex:
     ----------
     rows : table ``motion_index``
     vector : (N, D) float32, mapped
+    track : (M, N_TRACK) float32, mapped, the clips' tracks one behind the other
     folder : where it lies
     approximate : name of the graph's file; empty where every search is exact
     """
 
     rows: pa.Table
     vector: Vectors
+    track: Vectors
     folder: Path
     approximate: str = ""
 
@@ -88,26 +91,37 @@ def read(folder: Path) -> StoredIndex | None:
     except (OSError, pa.ArrowInvalid):
         return None
     said = {k.decode(): v.decode() for k, v in (rows.schema.metadata or {}).items()}
-    place = folder / said.get("vectors", "")
-    width = int(said.get("vector_length", "0"))
-    if not place.is_file() or not width or place.stat().st_size != 4 * width * rows.num_rows:
+    if not {"track_index", "track_count"} <= set(rows.column_names):
         return None
-    shape = (rows.num_rows, width)
-    vector = np.memmap(place, np.float32, "r", shape=shape) if rows.num_rows else np.zeros(shape, np.float32)
+    n_frames = rows["track_index"][-1].as_py() + rows["track_count"][-1].as_py() if rows.num_rows else 0
+    vector = _mapped(folder / said.get("vectors", ""), rows.num_rows, int(said.get("vector_length", "0")))
+    track = _mapped(folder / said.get("tracks", ""), n_frames, N_TRACK)
+    if vector is None or track is None:
+        return None
     approximate = said.get("approximate", "")
     if approximate and not (folder / approximate).is_file():
         return None
-    return StoredIndex(rows, vector, folder, approximate)
+    return StoredIndex(rows, vector, track, folder, approximate)
 
 
-def write_vectors(folder: Path, rows: pa.Table, vector: Vectors, *, exact_up_to: int = EXACT_UP_TO) -> dict[str, str]:
-    """Write the vectors of an index, and the graph of a large one; what the rows' metadata has to say of them.
+def _mapped(place: Path, n: int, width: int) -> Vectors | None:
+    """Map a file of n rows; None where it is not there or of another size."""
+    if not place.is_file() or not width or place.stat().st_size != 4 * width * n:
+        return None
+    return np.memmap(place, np.float32, "r", shape=(n, width)) if n else np.zeros((n, width), np.float32)
+
+
+def write_vectors(
+    folder: Path, rows: pa.Table, vector: Vectors, track: Vectors, *, exact_up_to: int = EXACT_UP_TO
+) -> dict[str, str]:
+    """Write vectors and tracks of an index, and the graph of a large one; what the rows' metadata has to say of them.
 
     Parameters
     ----------
     folder : of the index
     rows : table ``motion_index``, N rows
     vector : (N, D) float32
+    track : (M, N_TRACK) float32
     exact_up_to : int
         With more rows a graph is written: that of the index before with what changed taken out and put in.
 
@@ -121,12 +135,13 @@ def write_vectors(folder: Path, rows: pa.Table, vector: Vectors, *, exact_up_to:
         As the disk says it; the index before stays.
     """
     vector = np.ascontiguousarray(vector, np.float32)
-    data = vector.tobytes()
-    name = f"vectors-{hashlib.sha256(data).hexdigest()[:16]}.f32"
-    if not (folder / name).is_file():
-        with beside.written_beside(folder / name) as partial:
-            partial.write_bytes(data)
-    said = {"vectors": name, "vector_length": str(vector.shape[1])}
+    said = {"vector_length": str(vector.shape[1])}
+    for what, array in (("vectors", vector), ("tracks", np.ascontiguousarray(track, np.float32))):
+        data = array.tobytes()
+        said[what] = f"{what}-{hashlib.sha256(data).hexdigest()[:16]}.f32"
+        if not (folder / said[what]).is_file():
+            with beside.written_beside(folder / said[what]) as partial:
+                partial.write_bytes(data)
     if len(vector) > exact_up_to:
         said |= _write_graph(folder, rows, vector)
     return said
@@ -167,7 +182,7 @@ def _write_graph(folder: Path, rows: pa.Table, vector: Vectors) -> dict[str, str
     name = f"graph-{hashlib.sha256(keys.tobytes()).hexdigest()[:16]}.usearch"
     with beside.written_beside(folder / name) as partial:
         graph.save(str(partial))
-    recall = _recall(StoredIndex(rows, vector, folder, name))
+    recall = _recall(StoredIndex(rows, vector, np.zeros((0, N_TRACK), np.float32), folder, name))
     return {"approximate": name, "recall": f"{recall:.4f}"}
 
 

@@ -30,6 +30,8 @@ from schemas import usd as contract
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 _FILE = re.compile(r"(?P<file>.+?\.usd[acz]?)(?::(?P<prim>/.*))?", re.IGNORECASE)
+SHORTEST_M, TALLEST_M = 0.2, 10.0
+"""Bodies that are danced on, from lowest joint to head: others are in another unit than their file says."""
 _UNEVEN = 0.01
 
 
@@ -198,6 +200,13 @@ def _read(stage: Usd.Stage, name: str, root: Usd.Prim, prim: Usd.Prim, extra: Ma
         rig, 1.0, placed[:1] if first == 0 else np.zeros((1, 3)), np.tile(rotation.IDENTITY, (1, len(rig.joints), 1))
     )
     mapping = map_joints(rig, extra)
+    character = measure(rest, mapping, floor_m=0.0)
+    height_m = float(np.ptp(kinematics.rest_position(character.figure)[:, 1]))
+    if not SHORTEST_M <= height_m <= TALLEST_M:
+        raise ValueError(
+            f"want a body of {SHORTEST_M:g} to {TALLEST_M:g} m, got {height_m:.3g} m; say in the file what its unit is "
+            "(metersPerUnit), or scale the character"
+        )
     return Rig(
         name,
         str(above),
@@ -215,7 +224,7 @@ def _read(stage: Usd.Stage, name: str, root: Usd.Prim, prim: Usd.Prim, extra: Ma
         _ops(stage.GetPrimAtPath(above)),
         np.array(cache.GetLocalToWorldTransform(root)) @ correction,
         mapping,
-        measure(rest, mapping, floor_m=0.0),
+        character,
     )
 
 

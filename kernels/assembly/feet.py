@@ -28,6 +28,9 @@ from kernels.types import Choreography, Clip, Float
 Bool = NDArray[np.bool_]
 UP = np.array([0.0, 1.0, 0.0])
 
+SAY = 0.25
+"""Share of a pose above which the partner of a blend, too, must have its foot planted."""
+
 
 @dataclass(frozen=True)
 class Give:
@@ -60,7 +63,9 @@ class Give:
 def planted_feet(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> FootContacts:
     """Tell which foot is planted when, by the clips through the lineage.
 
-    Blending must not get to decide what counts as contact: the dominant clip of a frame does.
+    Blending must not get to decide what counts as contact: the dominant clip of a frame does, and its partner as well
+    where that has more than :data:`SAY` of the pose. A foot that lands just before a seam and swings after it does not
+    stand.
 
     Parameters
     ----------
@@ -70,15 +75,20 @@ def planted_feet(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -
     -------
     FootContacts of the dance's frames
     """
-    planted = np.zeros((2, len(dance.time_s), 2), bool)
+    line = dance.lineage
+    planted, partner = np.zeros((2, len(dance.time_s), 2), bool), np.ones((2, len(dance.time_s), 2), bool)
     clip_of_step = np.array(steps.clip_id, object)
+    has_say = (line.blend_step_index >= 0) & (line.blend_weight > SAY)
     for clip_id in dict.fromkeys(steps.clip_id):
         clip = clips[clip_id]
         position, _ = kinematics.place(clip)
         found = clip_contacts(clip, position)
-        frame = np.flatnonzero(clip_of_step[dance.lineage.step_index] == clip_id)
-        at = np.clip(np.round(dance.lineage.clip_time_s[frame] * clip.frame_rate_hz).astype(int), 0, clip.n_frames - 1)
-        planted[:, frame] = found.ankle[at], found.toes[at]
+        here = clip_of_step[line.step_index] == clip_id
+        there = has_say & (clip_of_step[line.blend_step_index] == clip_id)
+        for out, is_shown, time_s in ((planted, here, line.clip_time_s), (partner, there, line.blend_time_s)):
+            at = np.clip(np.round(time_s[is_shown] * clip.frame_rate_hz).astype(int), 0, clip.n_frames - 1)
+            out[:, is_shown] = found.ankle[at], found.toes[at]
+    planted &= partner
     return FootContacts(planted[0], planted[1], 0.0, grounding.ANKLE_HEIGHT_M, grounding.TOES_HEIGHT_M)
 
 

@@ -40,8 +40,8 @@ class PathCosts:
     usage : float, >= 0
         Showing a stretch between two motion beats for the n-th time costs ``usage · (n − 1)``.
     stay : float, >= 0
-        A transition r music beats after the one before it costs ``stay · (M − r) / M`` more where r < M: a phrase cut
-        short. The song's start and end are no transitions.
+        A transition r music beats after the one before it, or after the song's start, costs ``stay · (M − r) / M`` more
+        where r < M: a phrase cut short. The song's end cuts none short.
     stay_beats : int, >= 1
         M, beats of the music after which a stay is long enough; 1 for no price.
     missed_beat : float, >= 0
@@ -57,7 +57,7 @@ class PathCosts:
     seam: float = 0.5
     transition: float = 1.0
     transition_scale: float | None = None
-    rough: float = 2.0
+    rough: float = 4.0
     warp: float = 0.1
     leaving: float = 8.0
     warp_outside: float = 8.0

@@ -197,7 +197,7 @@ def find_path(
             step_price=step_price,
         )
         whole = program.solve(0, n_beats, after={n_beats: program.at_the_end})
-        if len(start) and np.isfinite(whole.begin[start]).any():
+        if len(start) and np.isfinite(whole.start[0][start]).any():
             moves = program.decode(whole, first=0, last=n_beats, arrived=None, starts=start)
 
             def total(candidate: list[Move], program: Program = program) -> float:
@@ -309,8 +309,8 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     edge = np.array([program.edge(v, u) for v, u in zip(end[:-1][seams[1:]], source[seams], strict=True)], np.int64)
     transition, repetition = np.zeros(len(moves)), np.zeros(len(moves))
     transition[seams], repetition[seams] = program.seam[edge], program.jump_back[edge]
-    stay, at = np.zeros(len(moves)), beat[seams]
-    stay[np.flatnonzero(seams)[1:]] = program.hurry[np.minimum(np.diff(at), program.long_enough) - 1]
+    stay = np.zeros(len(moves))
+    stay[seams] = program.hurry[np.minimum(np.diff(beat[seams], prepend=0), program.long_enough) - 1]
     shown, shown_by = program.stretches(moves)
     np.add.at(repetition, shown_by, usage_cost(shown, program.n_nodes, costs))
     diversity = np.zeros(len(moves))

@@ -10,8 +10,7 @@ one, up to M, where a stay is long enough. Two costs to go::
     arrive[r, k, v] = min(start[r, k, v], hurry(r) + min over transitions v → u of  cost(v → u) + start[0, k, u])
 
 with r + d taken as M where it is more. The inner minimum does not depend on r, so a beat costs M · N · |steps| + E
-operations, not M · E. The song's start is no transition: a dance begins there with r = M, and nothing is
-paid for where the song ends.
+operations, not M · E. The first stay begins with the song (r = 0); the last may end with it however short it is.
 
 A cost is finite exactly where the last beat can still be reached: the recursion runs backwards, so it *is* the backward
 reachability, and a decoded path can only use such nodes. No state exists for a step that is outside the bounds, or for
@@ -53,12 +52,10 @@ class Solution:
 
     Parameters
     ----------
-    begin : (N,), of starting a step on the window's first beat where no stay is cut short: the song's start
-    start : by beat, (N,), of starting a step right after a transition
+    start : by beat, (N,), of starting a step right after a transition, or where the song begins
     arrive : by beat, (M, N), of having arrived with 1, 2, … M music beats since the last transition
     """
 
-    begin: Float
     start: Mapping[int, Float]
     arrive: Mapping[int, Float]
 
@@ -239,12 +236,11 @@ class Program:
         start: dict[int, Float] = {}
         arrive: dict[int, Float] = dict(after)
         extra = self.stretch_price(price)
-        begin = np.full(self.n_nodes, np.inf)
         for beat in range(last - 1, first - 1, -1):
             ready = self.start_costs(beat, arrive, extra)
             arrive[beat] = self.relax(ready)
-            start[beat], begin = ready[0].copy(), ready[-1]
-        return Solution(begin.copy(), start, arrive)
+            start[beat] = ready[0].copy()
+        return Solution(start, arrive)
 
     def decode(
         self,
@@ -284,7 +280,7 @@ class Program:
             return kind, best
 
         if arrived is None:
-            node, stayed = int(starts[np.argmin(solution.begin[starts])]), self.long_enough
+            node, stayed = int(starts[np.argmin(solution.start[first][starts])]), 0
         else:
             node, stayed = arrived
         is_free = arrived is None  # the song's first step has no transition before it
@@ -303,15 +299,13 @@ class Program:
         return moves
 
     def beats_stayed(self, moves: list[Move]) -> int:
-        """Music beats from the last transition of some moves to their end, at most M; M where there is none."""
+        """Music beats from the last transition of a dance so far, or from its start, to its end; at most M."""
         stayed = 0
-        for index in range(len(moves) - 1, 0, -1):
+        for index in range(len(moves) - 1, -1, -1):
             stayed += self.steps[moves[index][2]][1]
-            if stayed >= self.long_enough:
+            if stayed >= self.long_enough or (index and self.ends(moves[index - 1])[1] != moves[index][1]):
                 break
-            if self.ends(moves[index - 1])[1] != moves[index][1]:
-                return stayed
-        return self.long_enough
+        return min(stayed, self.long_enough)
 
     def ends(self, move: Move) -> tuple[int, int]:
         """Beat and node where a move ends."""

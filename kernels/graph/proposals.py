@@ -44,7 +44,8 @@ class Proposals:
     @property
     def best_cost(self) -> float:
         """Cost of the cheapest dance; infinite where there is none."""
-        return float(self._whole.begin[self._starts].min(initial=np.inf))
+        start = self._whole.start.get(0)
+        return float(start[self._starts].min(initial=np.inf)) if start is not None else np.inf
 
     def through(self, interval: int, nodes: Mask | None = None) -> Float:
         """Cost of the cheapest dance for each step that could cover a music interval.
@@ -129,7 +130,7 @@ class Proposals:
             arrived = self._arrived.pop(at, np.full((most, program.n_nodes), np.inf))
             ready = np.vstack([np.full((1, program.n_nodes), np.inf), arrived])
             if at == 0:
-                ready[most, self._starts] = 0.0
+                ready[0, self._starts] = 0.0
             elif len(self._source):
                 left = (arrived + program.hurry[:, None]).min(axis=0)
                 np.minimum.at(ready[0], self._target, left[self._source] + self._edge_cost)

@@ -8,12 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.search.normalise import N_CHANNELS, VELOCITY
+from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float
 
 _N_FFT = 128
 _BANDS = (0, 3, 6, 11, 20, 33, 65)
 _N_JOINTS = (VELOCITY.stop - VELOCITY.start) // 3
-N_STATISTICS = 4 * N_CHANNELS + _N_JOINTS * len(_BANDS)
+_PERCENTILES = (0.05, 0.95)
+_PARTS = 3
+_HANDS = [JOINTS.index(f"{side}Hand") for side in ("left", "right")]
+# Where a hand is seen from: what it does about the shoulder tells a wave from a bow that lowers the shoulder.
+_REACHES = [
+    *(
+        (JOINTS.index(f"{side}Hand"), JOINTS.index(of))
+        for side in ("left", "right")
+        for of in (f"{side}UpperArm", "head", "hips")
+    ),
+    (_HANDS[0], _HANDS[1]),
+]
+_N_VALUES = N_CHANNELS + 4 * len(_REACHES)
+N_STATISTICS = (2 + len(_PERCENTILES)) * _N_VALUES + _PARTS * N_CHANNELS + _N_JOINTS * (1 + 4 * (len(_BANDS) - 1))
 
 
 def describe(channel: NDArray[np.float32]) -> Float:
@@ -27,17 +41,38 @@ def describe(channel: NDArray[np.float32]) -> Float:
     Returns
     -------
     (N_STATISTICS,) float64
-        Of every channel its mean, deviation, 5th and 95th percentile; of every joint its mean speed, and the logarithm
-        of the energy of its velocity in six bands up to half the rate.
+        Of every channel, and of the way and distance from either hand to shoulder, head, hips and the other hand: mean,
+        deviation, 5th and 95th percentile. Of every channel its mean in each third of the stretch. Of every joint its
+        mean speed, and the logarithm of the energy of its velocity in six bands up to half the rate, whole and by axis.
     """
-    value = channel.astype(np.float64)
-    low, high = np.percentile(value, (5, 95), axis=0)
-    speed = value[:, VELOCITY].reshape(len(value), _N_JOINTS, 3)
+    n = len(channel)
+    channel = channel.astype(np.float64)
+    position = channel[:, : VELOCITY.start].reshape(n, _N_JOINTS, 3)
+    reach = np.stack([position[:, a] - position[:, b] for a, b in _REACHES], axis=1)
+    far = np.linalg.norm(reach, axis=-1)
+    value = np.concatenate([channel, reach.reshape(n, -1), far], axis=1)
+    edges = np.linspace(0, n, _PARTS + 1).astype(int)
+    parts = [channel[min(a, n - 1) : max(b, a + 1)].mean(axis=0) for a, b in itertools.pairwise(edges.tolist())]
+    speed = channel[:, VELOCITY].reshape(n, _N_JOINTS, 3)
     # A stretch longer than the transform is cut into several, so that all of it counts.
-    n = -(-len(value) // _N_FFT) * _N_FFT
-    padded = np.concatenate([speed, np.zeros((n - len(value), _N_JOINTS, 3))]).reshape(-1, _N_FFT, _N_JOINTS, 3)
-    energy = (np.abs(np.fft.rfft(padded, axis=1)) ** 2).sum(axis=(0, 3)) / len(value)
-    bands = [np.log(1e-3 + energy[a:b].sum(axis=0)) for a, b in itertools.pairwise(_BANDS)]
+    padded = np.zeros((-(-n // _N_FFT) * _N_FFT, _N_JOINTS, 3))
+    padded[:n] = speed
+    spectrum = np.fft.rfft(padded.reshape(-1, _N_FFT, _N_JOINTS, 3), axis=1)
+    energy = (spectrum.real**2 + spectrum.imag**2).sum(axis=0) / n
+    bands = np.add.reduceat(energy, _BANDS[:-1], axis=0)
+    told = [np.log(1e-3 + bands.sum(axis=-1)), np.log(1e-3 + bands), np.linalg.norm(speed, axis=-1).mean(axis=0)]
     return np.concatenate(
-        [value.mean(axis=0), value.std(axis=0), low, high, np.linalg.norm(speed, axis=-1).mean(axis=0), *bands]
+        [value.mean(axis=0), value.std(axis=0), *_percentiles(value), *parts, *(each.reshape(-1) for each in told)]
     )
+
+
+def _percentiles(value: Float) -> list[Float]:
+    """Take percentiles of columns, straight between values: as NumPy's, which takes thrice as long."""
+    ordered = np.sort(value, axis=0)
+    found = []
+    for share in _PERCENTILES:
+        at = share * (len(value) - 1)
+        low = int(at)
+        high = min(low + 1, len(value) - 1)
+        found.append(ordered[low] * (1 - (at - low)) + ordered[high] * (at - low))
+    return found

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.search.aligned import COPY_M, Alignment
 from kernels.types import Float, Int
 
 MOST_QUERY_WINDOWS = 16
 UNLIKE_WEIGHT = 0.5
 _SPARE = 4
+_MOST_ALIGNED, _CANDIDATES = 400, 64
 
 Vectors = NDArray[np.float32]
 Candidates = Callable[[Vectors, int], Int]
 """Finds rows that may be near: of (Q, D) queries and a number for each, rows of the catalogue in order."""
+Copies = Callable[[Int], Sequence[Alignment]]
+"""Lays the query over clips, nearest first; of the first of them come back alignments, of as many as it can afford."""
 
 
 @dataclass(frozen=True)
@@ -29,12 +33,15 @@ class Hit:
     row : row of its window that is nearest to the query
     query_row : window of the query it is nearest to
     distance : mean over the query's windows of the distance to the clip's nearest window, 0 to 2
+        Of a copy multiplied by how far the joints are off, as a share of :data:`~kernels.search.aligned.COPY_M`.
+    copied : where the query lies in the clip, if the clip holds a copy of it
     """
 
     clip: int
     row: int
     query_row: int
     distance: float
+    copied: Alignment | None = None
 
 
 def distances(vector: Vectors, query: Vectors) -> NDArray[np.float32]:
@@ -61,6 +68,7 @@ def nearest_clips(
     k: int,
     is_allowed: NDArray[np.bool_] | None = None,
     candidates: Candidates | None = None,
+    copies: Copies | None = None,
 ) -> list[Hit]:
     """Rank clips by how near their windows are to those of a query.
 
@@ -75,6 +83,8 @@ def nearest_clips(
         Windows that may be found.
     candidates : function, or None
         Names rows worth comparing; without it every row is compared.
+    copies : function, or None
+        Tells copies of the query from other takes of its action among the nearest clips, and puts them first.
 
     Returns
     -------
@@ -87,24 +97,40 @@ def nearest_clips(
     query = query[at]
     end = np.append(start[1:], len(vector))
     if candidates is not None:
-        rows = candidates(query, _SPARE * k)
+        rows = candidates(query, max(_SPARE * k, _CANDIDATES if copies else 0))
         clips = np.unique(np.searchsorted(start, rows, side="right") - 1)
         taken = np.concatenate([np.arange(start[c], end[c]) for c in clips]) if len(clips) else np.zeros(0, np.int64)
         if not len(taken):
             return []
         inner = np.append(0, np.cumsum((end - start)[clips]))[:-1]
         allowed = None if is_allowed is None else is_allowed[taken]
-        found = nearest_clips(np.asarray(vector[taken]), inner, query, k=k, is_allowed=allowed)
-        return [Hit(int(clips[h.clip]), int(taken[h.row]), int(at[h.query_row]), h.distance) for h in found]
+        inside = None if copies is None else lambda near: copies(clips[near])
+        found = nearest_clips(np.asarray(vector[taken]), inner, query, k=k, is_allowed=allowed, copies=inside)
+        return [
+            replace(h, clip=int(clips[h.clip]), row=int(taken[h.row]), query_row=int(at[h.query_row])) for h in found
+        ]
     distance = distances(vector, query)
     if is_allowed is not None:
         distance[:, ~is_allowed] = np.inf
     score = np.minimum.reduceat(distance, start, axis=1).mean(axis=0)
-    n_near = min(_SPARE * k, len(score))
-    near = np.flatnonzero(score <= np.partition(score, n_near - 1)[n_near - 1])
-    best = near[np.argsort(score[near], kind="stable")][:n_near]
-    found = [_hit(vector, query, c, start[c], end[c], distance, at) for c in best.tolist() if np.isfinite(score[c])]
+    best = _least(score, max(_SPARE * k, _MOST_ALIGNED if copies else 0))
+    laid = dict(zip(best.tolist(), copies(best) if copies and len(best) else (), strict=False))
+    found = []
+    for rank, c in enumerate(best.tolist()):
+        copied = laid[c] if c in laid and laid[c].distance_m < COPY_M else None
+        if rank < _SPARE * k or copied:
+            hit = _hit(vector, query, c, start[c], end[c], distance, at)
+            found.append(
+                replace(hit, distance=hit.distance * copied.distance_m / COPY_M, copied=copied) if copied else hit
+            )
     return sorted(found, key=lambda h: (h.distance, h.clip))[:k]
+
+
+def _least(score: NDArray[np.floating], n: int) -> Int:
+    """Find the n least finite scores and their equals, in order."""
+    n = min(n, len(score))
+    near = np.flatnonzero((score <= np.partition(score, n - 1)[n - 1]) & np.isfinite(score))
+    return near[np.argsort(score[near], kind="stable")][:n]
 
 
 def _hit(vector: Vectors, query: Vectors, clip: int, a: int, b: int, coarse: Vectors, at: Int) -> Hit:

@@ -122,8 +122,10 @@ def normalise(position_xyz_m: Float, *, per_frame: bool = False, is_sized: bool 
     return turn(position - root, angle)
 
 
-def resample(position_xyz_m: Float, frame_rate_hz: float, start_s: float, end_s: float) -> Float:
-    """Take a stretch of a motion at :data:`RATE_HZ`, straight between frames.
+def resample(
+    position_xyz_m: Float, frame_rate_hz: float, start_s: float, end_s: float, *, rate_hz: float = RATE_HZ
+) -> Float:
+    """Take a stretch of a motion at another rate, straight between frames.
 
     Parameters
     ----------
@@ -131,6 +133,7 @@ def resample(position_xyz_m: Float, frame_rate_hz: float, start_s: float, end_s:
     frame_rate_hz : float, > 0
     start_s, end_s : float, seconds of the clip, ``0 <= start_s <= end_s``
         Beyond the clip's end there is nothing: the stretch ends there.
+    rate_hz : float, > 0
 
     Returns
     -------
@@ -138,8 +141,8 @@ def resample(position_xyz_m: Float, frame_rate_hz: float, start_s: float, end_s:
     """
     last = len(position_xyz_m) - 1
     end_s = min(end_s, last / frame_rate_hz)
-    n = int(np.floor((end_s - start_s) * RATE_HZ + 1e-6)) + 1
-    at = np.clip((start_s + np.arange(max(n, 1)) / RATE_HZ) * frame_rate_hz, 0, last)
+    n = int(np.floor((end_s - start_s) * rate_hz + 1e-6)) + 1
+    at = np.clip((start_s + np.arange(max(n, 1)) / rate_hz) * frame_rate_hz, 0, last)
     frame = np.minimum(at.astype(np.int64), max(last - 1, 0))
     share = (at - frame)[:, None, None]
     following = np.minimum(frame + 1, last)

@@ -7,7 +7,7 @@ import numpy as np
 from kernels.types import Float
 
 WINDOW_S = 4.0
-LONGEST_WHOLE_S = 6.0
+LONGEST_WHOLE_S = 8.0
 
 
 def windows(duration_s: float, *, window_s: float = WINDOW_S, longest_whole_s: float = LONGEST_WHOLE_S) -> Float:

@@ -59,5 +59,6 @@ def test_a_dance_is_dressed_and_its_feet_are_measured(studio, write_hero, tmp_pa
     assert fitted.skeleton is cast.figure
     assert facts["scale_ratio"] == pytest.approx(0.88, abs=1e-4)
     assert facts["foot_slide_cm_per_s"] < 2
+    assert abs(facts["added_foot_slide_cm_per_s"]) < 0.1
     assert facts["penetration_cm"] < 0.5
     assert facts["joints"]["hips"] == "hero_hips"

@@ -10,6 +10,7 @@ from assets.direction import DirectionError, Nodes, Song
 from assets.graph_path import Catalogue, Direction, by_graph
 from assets.proposals import place_of, propose
 from kernels.graph.nodes import beat_nodes
+from kernels.music.repeats import Repeat
 from kernels.types import BeatGrid, MotionGraph
 from schemas.pins import parse_pin
 from schemas.settings import PathSettings, Settings
@@ -94,3 +95,21 @@ def test_pins_that_conflict_are_refused(known, song):
     asked = Direction((parse_pin("5=crawl"),))
     with pytest.raises(dg.Failure, match="5=crawl"):
         propose(known, song, PLAIN, asked, place_of("1", song))
+
+
+def test_parts_that_come_again_are_those_of_the_dance(known, song):
+    """With repeats as pins the prices are those of the dance that has them; where one is asked about, it is free."""
+    song = replace(song, repeats=[Repeat(6, 12, 0, 0.9)])
+    again = replace(PLAIN, path=replace(PLAIN.path, repeat="structure"))
+    danced = by_graph(known, song, again, Direction())
+    assert danced.metadata["parts_danced_again"] == 1
+    plain = propose(known, song, PLAIN, Direction(), place_of("beat:1", song))
+    held = propose(known, song, again, Direction(), place_of("beat:1", song))
+    assert held["best_cost"] == pytest.approx(danced.metadata["cost"])
+    assert held["best_cost"] > plain["best_cost"] + 1e-6
+    for row in held["clips"]:
+        pinned = by_graph(known, song, PLAIN, Direction((parse_pin(row["pin"]),)))
+        assert row["extra_cost"] + held["best_cost"] >= pinned.metadata["cost"] - 1e-9
+    for place in ("beat:3-5", "beat:9-11"):
+        free = propose(known, song, again, Direction(), place_of(place, song))
+        assert free["best_cost"] == pytest.approx(plain["best_cost"])

@@ -6,6 +6,7 @@ import pytest
 
 from assets import search_tables
 from assets.tables import from_rows
+from kernels.search.aligned import N_TRACK
 from kernels.search.discriminant import unit
 from kernels.search.nearest import Proposal
 from schemas.motion import CLIP
@@ -40,19 +41,22 @@ def test_encoder_comes_back_as_it_was():
 
 def test_sessions_become_one_catalogue_in_order_of_clips(vector):
     cut = np.array([[0.0, 1.0], [0.5, 1.5]])
+    track = np.arange(5 * N_TRACK, dtype=np.float32).reshape(5, N_TRACK)
     embedded = [
-        search_tables.from_motion_embedding("s-b", cut, vector[:2]),
+        search_tables.from_motion_embedding("s-b", cut, vector[:2], track[:3]),
         pa.concat_tables(
             [
-                search_tables.from_motion_embedding("s-a", cut[:1], vector[2:3]),
-                search_tables.from_motion_embedding("s-gone", cut[:1], vector[3:4]),
+                search_tables.from_motion_embedding("s-a", cut[:1], vector[2:3], track[3:]),
+                search_tables.from_motion_embedding("s-gone", cut[:1], vector[3:4], track[:1]),
             ]
         ),
     ]
     clips = [clip_rows(**{"s-b": "read"}), clip_rows(**{"s-a": "read", "s-gone": "refused"})]
-    rows, found = search_tables.catalogue(zip(clips, embedded, strict=True))
+    rows, found, tracks = search_tables.catalogue(zip(clips, embedded, strict=True))
     assert rows["clip_id"] == ["s-a", "s-b", "s-b"]
     np.testing.assert_array_equal(found, vector[[2, 0, 1]])
+    np.testing.assert_array_equal(tracks, track[[3, 4, 0, 1, 2]])
+    assert (rows["track_index"], rows["track_count"]) == ([0, 2, 2], [2, 3, 3])
     start = search_tables.starts(rows["clip_id"])
     assert start.tolist() == [0, 1]
     table = search_tables.from_motion_index(rows, found, np.array([[1.0, 2.0], [3.0, 4.0]]), start)
@@ -65,6 +69,8 @@ def test_a_window_embedded_anew_has_another_key(vector):
     rows |= {name: ["x"] for name in ("label", "style", "licence", "path")} | {
         "is_labelled": [True],
         "duration_s": [1.0],
+        "track_index": [0],
+        "track_count": [1],
     }
     keys = [
         search_tables.from_motion_index(rows, v[None], np.zeros((1, 2)), np.zeros(1, np.int64))["row_key"][0].as_py()
@@ -74,7 +80,8 @@ def test_a_window_embedded_anew_has_another_key(vector):
 
 
 def test_a_catalogue_of_nothing_is_empty():
-    rows, found = search_tables.catalogue([])
+    rows, found, tracks = search_tables.catalogue([])
+    assert tracks.shape == (0, N_TRACK)
     assert rows["clip_id"] == []
     assert found.shape == (0, 512)
     start = search_tables.starts(rows["clip_id"])

@@ -134,3 +134,58 @@ def test_alternatives_differ(studio, dance):
     shutil.rmtree(studio / "dances")
     assert dance(alternatives=2).status == 0
     assert (studio / "dances" / "beat" / "graph_2.usdz").exists()
+
+
+def test_a_start_pose_and_an_end_pose(studio, dance):
+    """The first and the last frame stand as the clips do at those moments, and so does a beat between."""
+    asked = ["start=pose:kaede-rock@1.25", "5.25=pose:kaede-rock@2.25", "end=pose:ayame-step@3.25"]
+    outcome = dance(pins=asked)
+    assert outcome.status == 0, outcome.troubles
+    told = outcome.facts["pins"]
+    assert [pin["pin"] for pin in told] == asked
+    assert all(pin["is_kept"] for pin in told)
+    assert all(pin["distance_m"] < 0.02 for pin in told)
+    assert [pin["shown_clip_id"] for pin in told] == ["kaede-rock", "kaede-rock", "ayame-step"]
+    assert told[0]["at_s"] == 0.0
+    assert told[2]["at_s"] == pytest.approx(13.5, abs=0.2)
+    assert "cm from it in the mean" in outcome.report
+    poses = {
+        clip: pl.read_parquet(
+            studio / "lake" / "canonical_pose" / f"{clip.partition('-')[0]}.parquet", glob=False
+        ).filter(pl.col("clip_id") == clip)
+        for clip in ("kaede-rock", "ayame-step")
+    }
+    frames = pl.read_parquet(studio / "lake" / "dance_pose" / "beat|graph.parquet", glob=False)
+    for row, clip, at_s in ((0, "kaede-rock", 1.25), (-1, "ayame-step", 3.25)):
+        wanted = poses[clip].filter((pl.col("time_s") - at_s).abs() < 0.51 / 30)["position_xyz_m"].to_list()[0]
+        height = [joint[1] for joint in frames["position_xyz_m"].to_list()[row]]
+        assert max(abs(h - joint[1]) for h, joint in zip(height, wanted, strict=True)) < 0.05
+
+
+def test_poses_that_cannot_be_shown_are_refused_with_ways_out(dance):
+    unknown = dance(pins=["4=pose:kaede-rok@1"])
+    assert unknown.status == 2
+    assert unknown.facts["conflict"] == ["4=pose:kaede-rok@1"]
+    assert "called 'kaede-rok'" in unknown.facts["why"]
+    assert unknown.facts["ways_out"] == ["4=clip:kaede-rock in place of 4=pose:kaede-rok@1"]
+    late = dance(pins=["4=pose:kaede-rock@99"])
+    assert late.status == 2
+    assert "want a moment of kaede-rock" in "; ".join(late.troubles)
+    both = dance(pins=["start=kick", "start=pose:ayame-wave@2"])
+    assert both.status == 2
+    assert both.facts["conflict"] == ["start=kick", "start=pose:ayame-wave@2"]
+    assert "start=kick in place of start=pose:ayame-wave@2" in both.facts["ways_out"]
+    assert "no clip is all of this at the same time" in both.facts["why"]
+
+
+def test_poses_of_the_brief_hard_and_soft(studio, dance):
+    brief = studio / "songs" / "beat.brief.toml"
+    pose = '[[pin]]\nplace = "start"\npose = "kaede-kick@2.0"\n'
+    brief.write_text(pose)
+    hard = dance()
+    assert hard.status == 0, hard.troubles
+    assert hard.facts["pins"][0]["is_kept"]
+    brief.write_text('pins = "soft"\n' + pose)
+    soft = dance()
+    assert soft.status == 0, soft.troubles
+    assert soft.facts["costs"]["wish"] <= 1.0 + 1e-6

@@ -41,3 +41,14 @@ def test_what_cannot_be_proposed(built):
         commands.propose(built, "beat", "99", progress=NoProgress)
     with pytest.raises(StudioError, match="--pin: "):
         commands.propose(built, "beat", "4", pins=["x"], progress=NoProgress)
+
+
+def test_a_moment_that_is_proposed_can_be_pinned(built):
+    """The pose of the cheapest clip costs what was said, with another pose kept beside it."""
+    plain = commands.propose(built, "beat", "4", progress=NoProgress).facts
+    row = plain["clips"][0]
+    assert row["pose_pin"] == f"4=pose:{row['clip']}@{row['clip_time_s']:.3f}"
+    pinned = commands.propose(built, "beat", "8", pins=[row["pose_pin"]], progress=NoProgress)
+    assert pinned.status == 0
+    assert pinned.facts["pins"] == [row["pose_pin"]]
+    assert pinned.facts["best_cost"] == pytest.approx(plain["best_cost"] + row["extra_cost"], abs=0.05)

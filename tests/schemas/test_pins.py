@@ -17,6 +17,8 @@ from schemas.pins import PinWish, parse_pin
         ("start=clip:x", PinWish(place="start", clip="x")),
         (" 42 = spin = turn ", PinWish(at=42.0, label="spin = turn")),
         ("1=踊り", PinWish(at=1.0, label="踊り")),
+        ("start=pose:day-a@2.5", PinWish(place="start", pose="day-a@2.5")),
+        ("bar:3=pose:day-a@2", PinWish(bar=3, pose="day-a@2")),
     ],
 )
 def test_read_and_written_back(text, wanted):
@@ -38,6 +40,10 @@ def test_read_and_written_back(text, wanted):
         ("beat:0=spin", "want one place"),
         ("beat:5-5=spin", "until_beat after beat"),
         ("bar:4-3=spin", "until_bar after bar"),
+        ("1=pose:", "want one wish"),
+        ("1=pose:day-a", "KEY@SECONDS"),
+        ("1=pose:day-a@-1", "KEY@SECONDS"),
+        ("1=pose:@3", "KEY@SECONDS"),
     ],
 )
 def test_what_is_no_pin_says_why(text, word):
@@ -57,3 +63,8 @@ def test_of_several_clips_any_keeps_the_pin():
     assert pin.clips == ["day-a", "day-b"]
     assert [pin.is_kept_by(clip_id=c, label="x", style="") for c in ("day-b", "day-c")] == [True, False]
     assert parse_pin(pin.text) == pin
+
+
+def test_a_pose_is_a_moment_of_a_clip():
+    assert parse_pin("end=pose:day-a@7.25").pose_moment == ("day-a", 7.25)
+    assert parse_pin("end=spin").pose_moment == ("", 0.0)

@@ -6,16 +6,29 @@ import pyarrow.parquet as pq
 import pytest
 
 from assets.formats import motion_index
+from kernels.search.aligned import N_TRACK
 from kernels.search.discriminant import unit
 
 
 def table(vector, name="clip"):
     keys = [hash((name, row.tobytes())) for row in vector]
-    return pa.table({"clip_id": [f"{name}{i}" for i in range(len(vector))], "row_key": pa.array(keys, pa.int64())})
+    n = len(vector)
+    return pa.table(
+        {
+            "clip_id": [f"{name}{i}" for i in range(n)],
+            "row_key": pa.array(keys, pa.int64()),
+            "track_index": pa.array(2 * np.arange(n), pa.int64()),
+            "track_count": pa.array([2] * n, pa.int32()),
+        }
+    )
+
+
+def tracks(n):
+    return np.arange(2 * n * N_TRACK, dtype=np.float32).reshape(2 * n, N_TRACK)
 
 
 def store(folder, rows, vector, **options):
-    said = motion_index.write_vectors(folder, rows, vector, **options)
+    said = motion_index.write_vectors(folder, rows, vector, tracks(len(vector)), **options)
     pq.write_table(rows.replace_schema_metadata(said), folder / motion_index.ROWS)
     motion_index.remove_others(folder, said)
     return said
@@ -31,18 +44,21 @@ def test_what_is_written_is_mapped(tmp_path, vector):
     found = motion_index.read(tmp_path)
     assert isinstance(found.vector, np.memmap)
     np.testing.assert_array_equal(found.vector, vector)
+    np.testing.assert_array_equal(found.track, tracks(300))
     assert found.approximate == ""
 
 
 def test_an_empty_index_is_one(tmp_path, vector):
     store(tmp_path, table(vector[:0]), vector[:0])
-    assert motion_index.read(tmp_path).vector.shape == (0, 32)
+    found = motion_index.read(tmp_path)
+    assert (found.vector.shape, found.track.shape) == ((0, 32), (0, N_TRACK))
 
 
-def test_nothing_or_half_an_index_is_none(tmp_path, vector):
+@pytest.mark.parametrize("part", ["vectors", "tracks"])
+def test_nothing_or_half_an_index_is_none(tmp_path, vector, part):
     assert motion_index.read(tmp_path) is None
     said = store(tmp_path, table(vector), vector)
-    (tmp_path / said["vectors"]).write_bytes(b"short")
+    (tmp_path / said[part]).write_bytes(b"short")
     assert motion_index.read(tmp_path) is None
 
 
@@ -50,7 +66,16 @@ def test_the_files_before_are_taken_away(tmp_path, vector):
     first = store(tmp_path, table(vector), vector)
     second = store(tmp_path, table(vector[:9]), vector[:9])
     assert first["vectors"] != second["vectors"]
-    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([motion_index.ROWS, second["vectors"]])
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
+        [motion_index.ROWS, second["vectors"], second["tracks"]]
+    )
+
+
+def test_an_index_of_an_earlier_version_is_none(tmp_path, vector):
+    said = store(tmp_path, table(vector), vector)
+    old = table(vector).drop_columns(["track_index", "track_count"]).replace_schema_metadata(said)
+    pq.write_table(old, tmp_path / motion_index.ROWS)
+    assert motion_index.read(tmp_path) is None
 
 
 def test_a_large_one_has_a_graph_that_finds_the_near(tmp_path, vector):

@@ -171,3 +171,8 @@ def test_names():
     assert usd_character.split("a/hero.usd:/Hero/Skel") == ("a/hero.usd", "/Hero/Skel")
     assert usd_character.split("hero.usdc") == ("hero.usdc", "")
     assert Sdf.Path(usd_character.ANIMATION_PATH).IsAbsolutePath()
+
+
+def test_a_giant_is_in_another_unit_than_its_file_says(write_hero, tmp_path):
+    with pytest.raises(FormatError, match=r"0\.2 to 10 m, got 1\d\d m; say in the file what its unit is"):
+        usd_character.read_rig(write_hero(tmp_path / "giant.usda", size=100.0))

@@ -5,7 +5,7 @@ import pytest
 
 from kernels import rotation
 from kernels.assembly.blend import Dance, Lineage, assemble
-from kernels.assembly.feet import lock_feet, planted_feet
+from kernels.assembly.feet import SAY, lock_feet, planted_feet
 from kernels.assembly.foot_quality import foot_measures
 from kernels.assembly.seam_quality import seam_measures
 from kernels.assembly.stance import clip_contacts
@@ -44,6 +44,28 @@ def test_contacts_come_from_the_clips(dance, hops, clips):
     np.testing.assert_array_equal(planted.toes[frame], own.toes[at])
     np.testing.assert_array_equal(planted.ankle[frame], own.ankle[at])
     assert planted.foot.any()
+
+
+def test_in_the_middle_of_a_blend_both_clips_must_stand(clips, phrases):
+    hops = phrases(
+        *((name, 1.0 + 0.13 * k, 2, 0.5, 0.5) for k, name in enumerate(["step", "rock", "wave", "step"] * 4))
+    )
+    dance = assemble(hops, clips, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=float(hops.song_end_s[-1]))
+    planted, line = planted_feet(dance, hops, clips), dance.lineage
+    own = {name: clip_contacts(clip, kinematics.place(clip)[0]).toes for name, clip in clips.items()}
+
+    def stands(step_index, time_s):
+        clip = hops.clip_id[step_index]
+        return own[clip][round(time_s * clips[clip].frame_rate_hz)]
+
+    n_differ = 0
+    for i in np.flatnonzero(line.blend_weight > 0):
+        first = stands(line.step_index[i], line.clip_time_s[i])
+        second = stands(line.blend_step_index[i], line.blend_time_s[i])
+        wanted = first & second if line.blend_weight[i] > SAY else first
+        np.testing.assert_array_equal(planted.toes[i], wanted)
+        n_differ += int((wanted != first).any())
+    assert n_differ > 0
 
 
 def test_locked_feet_slide_less(dance, hops, clips):

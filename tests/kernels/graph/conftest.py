@@ -129,7 +129,7 @@ def every_dance():
                         beat + d, on, [*moves, (beat, node, kind)], cost + price + step, [*order, is_jump, node, kind]
                     )
 
-        dance(0, [(0, int(node), 0.0, 10**6) for node in starts], [], 0.0, [])
+        dance(0, [(0, int(node), 0.0, 0) for node in starts], [], 0.0, [])
         return found
 
     return find

@@ -17,18 +17,35 @@ def test_mean_and_deviation_come_first():
     value[:, 5] = np.tile([1.0, 3.0], 20)
     found = describe(value)
     assert found[5] == 2
-    assert found[N_CHANNELS + 5] == 1
+    assert found[N_CHANNELS + 28 + 5] == 1
 
 
 @pytest.mark.parametrize(("hertz", "band"), [(0.2, 0), (1.0, 2), (3.0, 4), (6.0, 5)])
 def test_a_swing_falls_into_its_band(hertz, band):
     value = np.zeros((90, N_CHANNELS), np.float32)
     value[:, VELOCITY.start] = np.sin(2 * np.pi * hertz * np.arange(90) / RATE_HZ)
-    energy = describe(value)[-6 * 22 :].reshape(6, 22)
+    energy = describe(value)[-25 * 22 : -19 * 22].reshape(6, 22)
     assert energy[:, 0].argmax() == band
     np.testing.assert_allclose(energy[:, 1], np.log(1e-3))
 
 
-def test_order_in_time_counts_only_by_speed(rng):
-    value = rng.normal(size=(64, N_CHANNELS)).astype(np.float32)
-    np.testing.assert_allclose(describe(value[::-1]), describe(value), atol=1e-6)
+def test_order_in_time_counts_by_thirds_alone(rng):
+    value = rng.normal(size=(63, N_CHANNELS)).astype(np.float32)
+    there, back = describe(value), describe(value[::-1])
+    parts = slice(4 * (N_CHANNELS + 28), 4 * (N_CHANNELS + 28) + 3 * N_CHANNELS)
+    np.testing.assert_allclose(back[parts].reshape(3, -1), there[parts].reshape(3, -1)[::-1], atol=1e-6)
+    np.testing.assert_allclose(np.delete(back, parts), np.delete(there, parts), atol=1e-6)
+
+
+def test_percentiles_are_those_of_numpy(rng):
+    value = rng.normal(size=(37, N_CHANNELS)).astype(np.float32)
+    low = describe(value)[2 * (N_CHANNELS + 28) :][:N_CHANNELS]
+    np.testing.assert_allclose(low, np.percentile(value.astype(float), 5, axis=0))
+
+
+def test_a_hand_is_seen_from_the_shoulder(rng):
+    value = rng.normal(size=(9, N_CHANNELS)).astype(np.float32)
+    moved = value.copy()
+    moved[:, : 3 * 22] += np.float32(5)
+    reach = slice(N_CHANNELS, N_CHANNELS + 28)
+    np.testing.assert_allclose(describe(moved)[reach], describe(value)[reach], atol=1e-5)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from kernels.search.aligned import COPY_M, Alignment
 from kernels.search.discriminant import unit
 from kernels.search.nearest import distances, nearest_clips, propose, steer
 
@@ -78,3 +79,36 @@ def test_the_near_have_the_say():
     assert [p.label for p in second] == [7, 4]
     assert sum(p.vote_ratio for p in second) == pytest.approx(1)
     assert propose(np.zeros((1, 0)), np.zeros(0, int)) == [[]]
+
+
+def test_a_copy_comes_first_and_says_where_it_lies(catalogue):
+    vector, start = catalogue
+    plain = nearest_clips(vector, start, vector[:1], k=10)
+    copy = plain[6].clip
+    asked = []
+
+    def copies(clips):
+        asked.append(clips.tolist())
+        return [Alignment(0.1 * COPY_M if c == copy else 1.0, 1.5, 3.5) for c in clips.tolist()]
+
+    found = nearest_clips(vector, start, vector[:1], k=10, copies=copies)
+    assert asked == [[h.clip for h in plain]]
+    at = next(rank for rank, h in enumerate(found) if h.clip == copy)
+    assert found[at].distance == pytest.approx(0.1 * plain[6].distance)
+    assert (found[at].copied.start_s, found[at].copied.end_s) == (1.5, 3.5)
+    rest = [(h.clip, h.distance) for h in found if h.clip != copy]
+    assert rest == [(h.clip, h.distance) for h in plain if h.clip != copy]
+    assert at == sum(h.distance < found[at].distance for h in plain)
+
+
+def test_copies_are_looked_for_among_candidates_by_the_clips_own_numbers(catalogue):
+    vector, start = catalogue
+    far = Alignment(1.0, 0.0, 0.0)
+    seen = []
+
+    def copies(clips):
+        seen.extend(clips.tolist())
+        return [far] * len(clips)
+
+    nearest_clips(vector, start, vector[:1], k=2, candidates=lambda query, n: np.array([6, 21]), copies=copies)
+    assert sorted(seen) == [2, 7]
