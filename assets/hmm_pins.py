@@ -54,10 +54,22 @@ def kept_or_refused(reach: SpanReach, nodes: Nodes, song: Song, asked: Direction
 
 
 def price(asked: Direction) -> float:
-    """Price of a beat that a pin would have otherwise: infinite for one that is to be kept."""
+    """Price of a beat that a pin would have otherwise: infinite for one that is to be kept.
+
+    Parameters
+    ----------
+    asked : Direction
+    """
     return SOFT_WISH if asked.is_soft else float("inf")
 
 
 def served(pins: Sequence[Pin], parts: int, start: int, length: int) -> str | None:
-    """Name of the pin that a span of the grid serves, of ``parts`` intervals a beat; None for none."""
+    """Name the pin that a span of the grid serves: the first of those it touches; None for none.
+
+    Parameters
+    ----------
+    pins : in the order given
+    parts : int, intervals of the grid to a beat
+    start, length : int, intervals
+    """
     return next((p.name for p in pins if start < p.last * parts and start + length > p.first * parts), None)

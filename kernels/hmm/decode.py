@@ -36,7 +36,7 @@ MISSED_BEAT = 2.0
 CROWDED = 6.0
 """Price of a seam at the very start or end of the song: its blend has no room."""
 
-REPETITION = 0.5
+REPETITION = 0.25
 WINDOW, LOOK_AHEAD = 16, 12
 """Intervals that are danced at a time, and looked at beyond."""
 
@@ -221,7 +221,12 @@ class Wish:
     motions: NDArray[np.bool_]
 
     def touched_by(self, start: Int, length: Int) -> Int:
-        """Count the intervals of the wish under spans, (n,) int64."""
+        """Count the intervals of the wish under spans, (n,) int64.
+
+        Parameters
+        ----------
+        start, length : (n,) int64, intervals
+        """
         return np.asarray(
             np.maximum(np.minimum(self.last, start + length) - np.maximum(self.first, start), 0), np.int64
         )
@@ -367,13 +372,14 @@ def decode_varied(
     crowded: Float,
     repetition_weight: float,
 ) -> Chain:
-    """Find a dance that costs little, showing the same again priced; arguments as :func:`decode`.
+    """Find a dance that costs little, showing the same again priced.
 
     Repetition is no sum over neighbours: the dance is made forwards, window by window, each with a look ahead, and
     every motion is dearer by how often earlier windows showed it.
 
     Parameters
     ----------
+    motions, links, places, log_initial, log_transition, price, crowded : as :func:`decode`
     repetition_weight : float, >= 0
         Scales the price of a motion that was shown before, :data:`REPETITION` for each time, of at most
         :data:`MOST_PRICED` times.

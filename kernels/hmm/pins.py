@@ -31,7 +31,12 @@ class SpanReach:
         self.is_danceable = self.keeps(())
 
     def keeps(self, pins: Sequence[Pin]) -> bool:
-        """Whether some dance of the whole song keeps all of these."""
+        """Whether some dance of the whole song keeps all of these.
+
+        Parameters
+        ----------
+        pins : of I motions each, in any order
+        """
         n = self._places.n_intervals
         reached = np.zeros(n + 1, bool)
         reached[0] = True
@@ -50,7 +55,12 @@ class SpanReach:
         return bool(reached[n])
 
     def fits(self, pin: Pin) -> bool:
-        """Whether each interval of a pin lies under a motion that it admits, reached or not."""
+        """Whether each interval of a pin lies under a motion that it admits, reached or not.
+
+        Parameters
+        ----------
+        pin : Pin of I motions
+        """
         covered = np.zeros(self._places.n_intervals, bool)
         for k in range(self._places.n_intervals):
             for d, (fits, _) in enumerate(self._places.at[k], start=1):

@@ -73,7 +73,16 @@ class Ends:
 
 
 def concatenate_ends(parts: list[Ends]) -> Ends:
-    """Stack the motions of several clips, at least one."""
+    """Stack the motions of several clips.
+
+    Parameters
+    ----------
+    parts : at least one
+
+    Returns
+    -------
+    Ends of all motions, in order
+    """
     return Ends(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Ends)))
 
 
