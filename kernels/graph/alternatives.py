@@ -12,6 +12,9 @@ from kernels.types import Float, MotionGraph
 SAME_CLIP_SHARE = 0.5
 """Price of a stretch of a clip that was danced elsewhere, as a share of that of the very stretch."""
 
+MOST_SAME_RATIO, MOST_DOUBLINGS = 0.5, 4
+"""Dances that show the same moment at once for longer are copies; the price is doubled at most so often to part them."""
+
 
 def shown_price(graph: MotionGraph, dances: list[Path], *, diversity: float) -> Float:
     """Price of showing again what other dances of the song show.
@@ -56,8 +59,9 @@ def find_alternatives(
     Returns
     -------
     list of n Paths
-        The first as without alternatives; the k-th the cheapest when what the k − 1 before it show has its price. Where
-        the catalogue has nothing else, dances may be alike: their ``diversity_cost`` tells.
+        The first as without alternatives; the k-th the cheapest when what the k − 1 before it show has its price, doubled
+        while it shows the same as one of them for more than half of the song. Where the catalogue has nothing else,
+        dances may be alike: their ``diversity_cost`` tells.
 
     Raises
     ------
@@ -68,8 +72,30 @@ def find_alternatives(
         raise ValueError(f"n, diversity: want n >= 1 and diversity >= 0, got {n} and {diversity}")
     dances: list[Path] = []
     for _ in range(n):
-        dances.append(find(shown_price(graph, dances, diversity=diversity)))
+        for doubling in range(MOST_DOUBLINGS + 1):
+            found = find(shown_price(graph, dances, diversity=diversity * 2**doubling))
+            if not diversity or all(same_ratio(found, other) <= MOST_SAME_RATIO for other in dances):
+                break
+        dances.append(found)
     return dances
+
+
+def same_ratio(one: Path, other: Path) -> float:
+    """Share of the song's beats at which two dances show the same step.
+
+    Parameters
+    ----------
+    one, other : Paths over the same beats
+
+    Returns
+    -------
+    float, 0 to 1; 0 for a dance without steps
+    """
+    mine, theirs = (
+        np.stack([path.beat_index, path.beat_span, path.source_node, path.motion_span], axis=1) for path in (one, other)
+    )
+    same = (mine[:, None] == theirs[None]).all(axis=-1).any(axis=1)
+    return float(one.beat_span[same].sum() / max(one.beat_span.sum(), 1))
 
 
 def shared_ratio(graph: MotionGraph, one: Path, other: Path) -> float:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
+from kernels.graph.alternatives import find_alternatives, same_ratio, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts
 from kernels.graph.path import find_path
 
@@ -49,3 +49,12 @@ def test_bad_arguments(three_clips):
         dances(three_clips, 0)
     with pytest.raises(ValueError, match="n, diversity"):
         dances(three_clips, 1, diversity=-1.0)
+
+
+def test_the_price_rises_until_dances_differ(make_graph):
+    # The second clip is a fifth too slow: no dance leaves the first for it at the usual price.
+    graph = make_graph([np.arange(6) * 0.5, np.arange(6) * 0.6])
+    found = dances(graph, 2)
+    assert [int(graph.clip_index[path.source_node[0]]) for path in found] == [0, 1]
+    assert same_ratio(*found) == 0
+    assert same_ratio(found[0], found[0]) == 1
