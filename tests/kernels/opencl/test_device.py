@@ -76,7 +76,7 @@ def test_real_devices_are_described_in_their_order():
         assert pick_device(info.index).name.strip() == info.name
 
 
-@pytest.mark.parametrize("real", list_devices(), ids=str)
+@pytest.mark.parametrize("real", list_devices(), ids=lambda real: real.name.strip())
 def test_kernels_are_built_with_their_constants_or_the_compiler_says_why(real):
     context = device.cl.Context([real])
     assert only_device(context) == real
