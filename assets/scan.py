@@ -3,6 +3,7 @@
 Policy only: reading a recording's content is the business of the capture and music areas.
 """
 
+import difflib
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -205,6 +206,11 @@ def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int, notes:
                 problem,
             )
         )
+    for idle in sorted({f"songs/{b}" for b in briefs} - {s.brief for s in songs}):
+        wanted = idle.removesuffix(".brief.toml")
+        near = difflib.get_close_matches(wanted, [s.path.rpartition(".")[0] for s in songs], n=1, cutoff=0.8)
+        meant = f"; if {near[0]!r} was meant, name it {near[0]}.brief.toml" if near else ""
+        notes.append(f"{idle}: no song {wanted} is beside it; left alone{meant}")
     return sorted(songs, key=lambda s: s.path)
 
 

@@ -13,7 +13,7 @@ SAME_CLIP_SHARE = 0.5
 """Price of a stretch of a clip that was danced elsewhere, as a share of that of the very stretch."""
 
 MOST_SAME_RATIO, MOST_DOUBLINGS = 0.5, 4
-"""Dances that show the same moment at once for longer are copies; the price is doubled at most so often to part them."""
+"""Dances that are alike for more of the song are copies; the price is doubled at most so often to part them."""
 
 
 def shown_price(graph: MotionGraph, dances: list[Path], *, diversity: float) -> Float:
@@ -59,9 +59,9 @@ def find_alternatives(
     Returns
     -------
     list of n Paths
-        The first as without alternatives; the k-th the cheapest when what the k − 1 before it show has its price, doubled
-        while it shows the same as one of them for more than half of the song. Where the catalogue has nothing else,
-        dances may be alike: their ``diversity_cost`` tells.
+        The first as without alternatives; the k-th the cheapest when what the k − 1 before it show has its price,
+        doubled while it shows the same as one of them for more than half of the song. Where the catalogue has nothing
+        else, dances may be alike: their ``diversity_cost`` tells.
 
     Raises
     ------

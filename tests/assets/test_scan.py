@@ -171,6 +171,17 @@ def test_name_that_is_no_text_is_listed(studio, tmp_path):
 def test_brief_beside_a_song(studio):
     found = look(studio({"songs/x.wav": b"1", "songs/x.brief.toml": b"", "songs/y.wav": b"2"}))
     assert [s.brief for s in found.songs] == ["songs/x.brief.toml", ""]
+    assert found.notes == ()
+
+
+def test_a_brief_beside_no_song_is_a_note(studio):
+    found = look(studio({"songs/waltz.wav": b"1", "songs/Waltz.brief.toml": b"", "songs/tango.brief.toml": b""}))
+    assert found.songs[0].brief == ""
+    assert found.notes == (
+        "songs/Waltz.brief.toml: no song songs/Waltz is beside it; left alone; if 'songs/waltz' was meant, name it "
+        "songs/waltz.brief.toml",
+        "songs/tango.brief.toml: no song songs/tango is beside it; left alone",
+    )
 
 
 SUIT = b"frame,time_s,sensor,px_m,py_m,pz_m,qw,qx,qy,qz,is_valid\n"
