@@ -27,6 +27,8 @@ _FREE = frozenset(
     ]
 )
 _SHARE_ALIKE = re.compile(r"(A|L)?GPL-|MPL-|EUPL-|ODBL-|CDLA-SHARING-")
+_COMMONS = re.compile(r"(CC-)?(BY|NC|ND|SA)(-(BY|NC|ND|SA))*(-\d+(\.\d+)*)?(-[A-Z]{2,3})?")
+"""A licence of Creative Commons, or its terms alone; whole, because ``by`` is a word as well."""
 _TOKEN = re.compile(r"\(|\)|[^\s()]+")
 
 
@@ -108,18 +110,17 @@ def _one(words: list[str]) -> tuple[Terms, list[str]]:
 
 
 def _terms_of_name(name: str) -> Terms:
-    parts = set(name.replace(" ", "-").split("-"))
     if name in _FREE:
         return Terms()
     if _SHARE_ALIKE.match(name):
         return Terms(share_alike=True, attribution=True)
-    known = parts & {"BY", "NC", "ND", "SA"}
+    parts = set(name.replace(" ", "-").split("-"))
     return Terms(
-        is_internal=not known,
+        is_internal=not _COMMONS.fullmatch(name.replace(" ", "-")),
         no_derivatives="ND" in parts,
         non_commercial="NC" in parts,
         share_alike="SA" in parts,
-        attribution=bool(known) or name not in ("", STUDIO.upper()),
+        attribution=name not in ("", STUDIO.upper()),
     )
 
 
@@ -168,8 +169,10 @@ def report(licence_of: Mapping[str, str]) -> dict[str, object]:
             f"; {len(unknown)} of {len(licence_of)} clips have no licence that is known and count as the studio's own"
         )
     keep = [licence for licence in by_licence if terms_of(licence).share_alike]
-    if keep and any(terms != terms_of(licence) for licence in keep):
-        sentence += f"; {', '.join(keep)} wants the whole under its own terms, which the others do not allow"
+    if len(keep) > 1:
+        sentence += f"; {', '.join(keep)} each want the whole under their own terms"
+    elif keep and terms != terms_of(keep[0]):
+        sentence += f"; {keep[0]} wants the whole under its own terms, which the others do not allow"
     return {"name": name, "terms": terms.words(), "clips": by_licence, "unknown": unknown, "sentence": sentence}
 
 

@@ -19,6 +19,12 @@ from assets.licences import Terms, free_to_join, is_allowed, may_be_joined, repo
         ("studio", ["internal"]),
         ("", ["internal"]),
         ("Ask Bob", ["internal", "attribution"]),
+        ("CC-BY-NC-SA-2.0-FR", ["non commercial", "share alike", "attribution"]),
+        ("by-nd", ["no derivatives", "attribution"]),
+        ("Recorded by Anna, do not pass on", ["internal", "attribution"]),
+        ("LicenseRef-by-Bob", ["internal", "attribution"]),
+        ("CC-BY 4.0, no derivatives", ["internal", "attribution"]),
+        ("studio-ND", ["internal", "no derivatives", "attribution"]),
         ("GPL-3.0-or-later", ["share alike", "attribution"]),
         ("MIT AND CC-BY-NC-4.0", ["non commercial", "attribution"]),
         ("CC-BY-NC-ND-4.0 OR CC-BY-4.0", ["attribution"]),
@@ -69,6 +75,7 @@ def test_a_report_names_what_rules_and_what_nobody_knows():
     assert "2 of 4 clips have no licence that is known and count as the studio's own" in told["sentence"]
     assert "own terms" in report({"a": "CC-BY-SA-4.0", "b": "CC-BY-NC-4.0"})["sentence"]
     assert "own terms" not in report({"a": "CC-BY-SA-4.0", "b": "CC-BY-4.0"})["sentence"]
+    assert "each want the whole" in report({"a": "CC-BY-SA-4.0", "b": "GPL-3.0-only"})["sentence"]
 
 
 def test_pieces_are_made_of_what_may_be_changed():
