@@ -25,6 +25,7 @@ from kernels.graph.program import Program
 from kernels.graph.proposals import Proposals
 from kernels.graph.structure import structure_pins
 from kernels.types import Float, Int
+from schemas.keys import is_mirrored
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import PathSettings, Settings
 
@@ -113,11 +114,15 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
 
 
 def _of_clip(known: Catalogue, place: Asked, node: int, best: int) -> Mapping[str, Any]:
-    told = {"label": str(known.nodes.label[node]), "style": str(known.nodes.style[node])}
+    """Tell of a clip what is seen of it where it is cheapest; a pin cannot name the pose of a mirror image."""
+    shown = node if best < 0 else best
+    told = {"label": str(known.nodes.label[shown]), "style": str(known.nodes.style[shown])}
     if best < 0:
         return told
     at_s = float(known.graph.time_s[best])
-    return {**told, "clip_time_s": at_s, "pose_pin": f"{place.place}=pose:{known.nodes.clip_id[best]}@{at_s:.3f}"}
+    is_image = is_mirrored(known.clip_ids[known.graph.clip_index[best]])
+    pose = {} if is_image else {"pose_pin": f"{place.place}=pose:{known.nodes.clip_id[best]}@{at_s:.3f}"}
+    return {**told, "clip_time_s": at_s, "is_mirrored": is_image, **pose}
 
 
 def _of_many(known: Catalogue, nodes: NDArray[np.bool_], best: int) -> Mapping[str, Any]:

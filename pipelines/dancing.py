@@ -19,6 +19,7 @@ from pipelines.files import StudioError, write_beside
 from pipelines.io_managers import StoredTable
 from pipelines.resources import StudioFolder
 from schemas.choreography import CHOREOGRAPHY
+from schemas.keys import mirrored, seen_label
 from schemas.pins import PinWish
 
 
@@ -110,14 +111,14 @@ def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame
             facts.append({"pin": wish.text, "from_s": float(from_s), "to_s": float(to_s), **posed.facts(wish)})
             continue
         here = steps.filter((pl.col("song_end_s") > from_s + 1e-6) & (pl.col("song_start_s") < to_s - 1e-6))
-        danced = here["clip_id"].unique(maintain_order=True).to_list()
+        danced = list(dict.fromkeys(here["clip_id", "is_mirrored"].iter_rows()))
         facts.append(
             {
                 "pin": wish.text,
                 "from_s": float(from_s),
                 "to_s": float(to_s),
-                "clips": danced,
-                "is_kept": all(wish.is_kept_by(**_named(clips[clip])) for clip in danced),
+                "clips": list(dict.fromkeys(clip for clip, _ in danced)),
+                "is_kept": all(wish.is_kept_by(**_named(clips[clip], is_image=image)) for clip, image in danced),
             }
         )
     return facts
@@ -144,8 +145,11 @@ class _Posed:
         return {"clips": [shown["shown_clip_id"]] if "shown_clip_id" in shown else [], **shown}
 
 
-def _named(clip: Mapping[str, Any]) -> dict[str, str]:
-    return {"clip_id": str(clip["clip_id"]), "label": str(clip["label"]), "style": str(clip["style"])}
+def _named(clip: Mapping[str, Any], *, is_image: bool) -> dict[str, str]:
+    """Name what is seen of a clip, or of its mirror image."""
+    clip_id, label = str(clip["clip_id"]), str(clip["label"])
+    seen = seen_label(label, mirrored(clip_id) if is_image else clip_id)
+    return {"clip_id": clip_id, "label": seen, "style": str(clip["style"])}
 
 
 def report_of(facts: dict[str, Any]) -> str:

@@ -10,9 +10,9 @@ costs more.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -261,28 +261,43 @@ def find_conflict(
 
     Notes
     -----
-    A set that cannot be kept cannot be kept with more in it. Leaving out pins one at a time gives a set that none can
-    be left out of; smaller ones are then looked for by size. That is a search over subsets, but of a director's pins:
-    a dozen, most of them far apart.
+    A set that cannot be kept cannot be kept with more in it. So every conflict has one of the pins that a largest set
+    which *can* be kept leaves out: the smallest conflict is a smallest set that hits all of what such sets leave out.
+    Those are found one by one: the smallest set that hits all that is known either conflicts and is the answer, or
+    grows to another set that can be kept. (Ignatiev, Previti, Liffiton and Marques-Silva, "Smallest MUS extraction with
+    minimal hitting set dualization", CP 2015.) Trying all sets by size instead would take years for twenty pins that
+    only together conflict.
     """
-    every = tuple(range(len(pins)))
     if reach.keeps(pins):
         return None
-    core = list(every)
-    for index in every:
-        fewer = [i for i in core if i != index]
-        if not reach.keeps([pins[i] for i in fewer]):
-            core = fewer
-    smallest = next(
-        (
-            chosen
-            for size in range(1, len(core))
-            for chosen in combinations(every, size)
-            if not reach.keeps([pins[i] for i in chosen])
-        ),
-        tuple(core),
-    )
+    left_out: list[frozenset[int]] = []
+    while True:
+        smallest = _first_hitting(left_out)
+        if not reach.keeps([pins[i] for i in smallest]):
+            break
+        kept = set(smallest)
+        for index in range(len(pins)):
+            if index not in kept and reach.keeps([pins[i] for i in sorted(kept | {index})]):
+                kept.add(index)
+        left_out.append(frozenset(range(len(pins))) - kept)
     return Conflict(smallest, _reason(reach, [pins[i] for i in smallest]), _ways_out(reach, pins, smallest, choices))
+
+
+def _first_hitting(sets: Sequence[frozenset[int]]) -> tuple[int, ...]:
+    """Find the smallest set that has a member of each, of several the first; in ascending order."""
+
+    def hits(rest: Sequence[frozenset[int]], size: int) -> tuple[int, ...] | None:
+        if not rest:
+            return ()
+        for first in sorted(frozenset().union(*rest)) if size else ():
+            # What lies below the first one taken is no longer to be had.
+            left = [frozenset(i for i in members if i > first) for members in rest if first not in members]
+            more = hits(left, size - 1) if all(left) else None
+            if more is not None:
+                return (first, *more)
+        return None
+
+    return next(found for size in itertools.count() if (found := hits(sets, size)) is not None)
 
 
 def _reason(reach: Danceable, pins: Sequence[Pin]) -> str:

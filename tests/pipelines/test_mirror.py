@@ -41,3 +41,31 @@ def test_a_mirrored_catalogue_is_twice_as_large_and_its_dance_says_what_is_mirro
     arms = [tables.JOINTS.index(f"{side}UpperArm") for side in ("left", "right")]
     unlike = [np.abs(np.abs((shown[arms] * q[at][arms]).sum(-1)) - 1).max() for q in (turned, moved.rotation_wxyz)]
     assert unlike[0] < 2e-3
+
+
+def test_a_mirrored_clip_keeps_pins_by_what_it_shows(studio):
+    """One clip leads to the left; pinned to the right and to the left, both are its work, and told as kept."""
+    (studio / "odori.toml").write_text("[motion_graph]\nmirror = true\n")
+    named = studio / "clips" / "ayame" / "clips.csv"
+    named.write_text(named.read_text().replace("step.bvh,step,", "step.bvh,step-left,"))
+    outcome = commands.dance(
+        studio,
+        ["beat"],
+        pins=["2=step-right", "8=step-left"],
+        method="graph",
+        frame_rate_hz=None,
+        out=None,
+        progress=NoProgress,
+    )
+    assert outcome.status == 0, outcome.troubles
+    assert [(pin["pin"], pin["clips"], pin["is_kept"]) for pin in outcome.facts["pins"]] == [
+        ("2=step-right", ["ayame-step"], True),
+        ("8=step-left", ["ayame-step"], True),
+    ]
+    lineage = pl.DataFrame(rows(studio, "frame_lineage", "beat|graph"))
+    shown = {at: lineage.filter(pl.col("time_s") >= at)["is_mirrored"][0] for at in (2.0, 8.0)}
+    assert shown == {2.0: True, 8.0: False}
+    proposed = commands.propose(studio, "beat", "4", pins=["4=step-right"], progress=NoProgress)
+    row = proposed.facts["clips"][0]
+    assert (row["label"], row["is_mirrored"]) == ("step-right", True)
+    assert "pose_pin" not in row

@@ -143,6 +143,18 @@ def test_reasons_and_ways_out(two_clips):
     assert find_conflict(reach, []) is None
 
 
+def test_many_pins_that_only_together_conflict(make_graph):
+    """Each forbids one of 24 clips: all sets by size would be sixteen million. Of equal conflicts the first is told."""
+    beat_s = np.arange(3) * 0.5
+    graph = make_graph([beat_s] * 24)
+    reach = reach_of(graph, beat_s)
+    pins = [Pin(f"not {clip}", 0, 1, graph.clip_index != clip) for clip in range(24)]
+    assert find_conflict(reach, pins).pin_index == tuple(range(24))
+    assert find_conflict(reach, pins[1:]) is None
+    nothing = [Pin(f"nothing {i}", 1, 2, np.zeros(72, bool)) for i in range(2)]
+    assert find_conflict(reach, [*pins, *nothing]).pin_index == (24,)
+
+
 def test_tempo_is_named(two_clips, make_graph):
     graph = make_graph([np.arange(6) * 0.5, np.arange(3) * 5.0])
     reach = reach_of(graph, np.arange(5) * 0.5)
