@@ -27,7 +27,7 @@ from kernels.graph.program import StepPrice
 from kernels.graph.structure import structure_pins
 from kernels.graph.transitions import THRESHOLD
 from kernels.types import BeatGrid, Choreography, Float, Int, MotionGraph
-from schemas.keys import seen_label, source_clip
+from schemas.keys import is_mirrored, seen_label, source_clip
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
 
@@ -113,17 +113,23 @@ def catalogue(
     Returns
     -------
     Catalogue
-        Without the transitions of clips that may not be changed: those are danced whole or not at all.
+        Without the transitions of clips that may not be changed, and without their mirror images: those are danced
+        whole or not at all.
     """
     known = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
     facts = [known[source_clip(clip)] for clip in clip_ids]
     facts = [row | {"label": seen_label(str(row["label"]), clip)} for row, clip in zip(facts, clip_ids, strict=True)]
     of_node = graph.clip_index
     licence = [str(row["licence"]) for row in facts]
-    is_whole = np.array([licences.terms_of(name).no_derivatives for name in licence] or [False])[of_node]
+    is_fixed = [not licences.may_be_joined(name) for name in licence]
+    is_whole = np.array(is_fixed or [False])[of_node]
     free = ~(is_whole[graph.source] | is_whole[graph.target])
     nodes = Nodes(*(np.array([str(row[c]) for row in facts] or [""])[of_node] for c in ("clip_id", "label", "style")))
-    is_allowed = np.array([licences.is_allowed(name, allow) for name in licence] or [True])[of_node]
+    may_be_danced = [
+        licences.is_allowed(name, allow) and not (fixed and is_mirrored(clip))
+        for name, fixed, clip in zip(licence, is_fixed, clip_ids, strict=True)
+    ]
+    is_allowed = np.array(may_be_danced or [True])[of_node]
     free_graph = replace(graph, source=graph.source[free], target=graph.target[free], weight=graph.weight[free])
     return Catalogue(free_graph, clip_ids, nodes, is_allowed, poses)
 
