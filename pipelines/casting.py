@@ -40,9 +40,8 @@ def named(studio: StudioFolder, sources: Sources, text: str) -> str:
     if hits:
         raise StudioError(f"--character: want one clip, {text!r} is {', '.join(hits)}; give its key")
     near = difflib.get_close_matches(text, clips, n=3, cutoff=0.3)
-    raise StudioError(
-        f"--character: want a clip of this studio or a USD file, got {text!r}; near are {', '.join(near) or 'none'}"
-    )
+    known = f"near are {', '.join(near)}" if near else f"there are {', '.join(sorted(clips)[:10]) or 'none'}"
+    raise StudioError(f"--character: want a clip of this studio or a USD file, got {text!r}; {known}")
 
 
 def _file(studio: StudioFolder, text: str) -> str:

@@ -136,6 +136,8 @@ def parse_pin(text: str) -> PinWish:
     elif counted:
         unit = counted["unit"]
         values[unit] = int(counted["first"])
+        if not values[unit]:
+            raise ValueError(f"pin: want {unit}s counted from 1, got {text!r}")
         if counted["last"]:
             values[f"until_{unit}"] = int(counted["last"])
     kind, colon, name = wish.partition(":")

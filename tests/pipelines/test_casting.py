@@ -71,6 +71,8 @@ def test_the_bones_of_a_clip_by_the_brief(studio, dance):
 def test_what_cannot_be_cast(studio, dance, tmp_path):
     with pytest.raises(StudioError, match="--character: want a clip of this studio or a USD file, got 'kaede-kik'"):
         dance(character="kaede-kik")
+    with pytest.raises(StudioError, match=r"got '\?'; there are ayame-step, ayame-twist, "):
+        dance(character="?")
     with pytest.raises(StudioError, match=r"--character: .*want the USD file of a character, got no such file"):
         dance(character="nobody.usdz")
     assert dance(character="kick.bvh").facts["character"]["clip_id"] == "kaede-kick"

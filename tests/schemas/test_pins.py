@@ -37,7 +37,7 @@ def test_read_and_written_back(text, wanted):
         ("42=clip:", "want one wish"),
         ("16-12=spin", "until after at"),
         ("16-16=spin", "until after at"),
-        ("beat:0=spin", "want one place"),
+        ("beat:0=spin", "want beats counted from 1"),
         ("beat:5-5=spin", "until_beat after beat"),
         ("bar:4-3=spin", "until_bar after bar"),
         ("1=pose:", "want one wish"),
