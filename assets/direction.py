@@ -56,11 +56,15 @@ GRAPH_PARTS = Parts("beats", "way through the motion graph")
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """What pins can name of the nodes of a graph, or of recorded motions; (N,) texts each."""
+    """What pins can name of the nodes of a graph, or of recorded motions; (N,) texts each.
+
+    ``is_whole``, (N,) bool or None for none, tells those of clips that are danced whole or not at all.
+    """
 
     clip_id: NDArray[np.str_]
     label: NDArray[np.str_]
     style: NDArray[np.str_]
+    is_whole: NDArray[np.bool_] | None = None
 
     def wished(self, wish: PinWish) -> NDArray[np.bool_]:
         """Find the nodes that a wish admits, (N,) bool."""
@@ -181,7 +185,7 @@ def sentences(
     Returns
     -------
     list of str
-        The reason, then one line for each way out.
+        The reason, then one line for each way out; last, whether there are more conflicts.
     """
     those = [wishes[i] for i in conflict.pin_index]
     names = ", ".join(w.text for w in those)
@@ -197,8 +201,14 @@ def sentences(
         "path": f"each of them can be kept, but no {parts.way} keeps them all"
         + _within([pins[i] for i in conflict.pin_index]),
     }[conflict.reason]
+    fixed = [
+        w.text for w in those if nodes.is_whole is not None and nodes.is_whole[nodes.wished(w)].all() and not w.pose
+    ]
+    if fixed and conflict.reason in ("start", "path"):
+        reason += f"; by its licence the clip of {' and '.join(fixed)} may not be changed and enters no blend"
     ways = [way_out(way, pins, wishes, song) for way in conflict.ways_out]
-    return [f"{names}: {reason}", *(f"would do: {way}" for way in ways)]
+    more = ["other pins conflict too: mend this conflict first"] if conflict.has_more else []
+    return [f"{names}: {reason}", *(f"would do: {way}" for way in ways), *more]
 
 
 def _within(pins: Sequence[Pin]) -> str:

@@ -104,11 +104,13 @@ class Conflict:
         be reached from the start in time, or the end from it), "same_time" (each can be kept, but no node is admitted
         by all of those that meet in one interval), or "path" (each can be kept, not all of them)
     ways_out : nearest first, at most one shift and one choice a pin; empty where none was found
+    has_more : whether other pins conflict even without any one of these; ways out are then of this conflict alone
     """
 
     pin_index: tuple[int, ...]
     reason: str
     ways_out: tuple[WayOut, ...]
+    has_more: bool = False
 
 
 def admitted(pins: Sequence[Pin], n_intervals: int, n_nodes: int) -> Mask:
@@ -280,7 +282,13 @@ def find_conflict(
             if index not in kept and reach.keeps([pins[i] for i in sorted(kept | {index})]):
                 kept.add(index)
         left_out.append(frozenset(range(len(pins))) - kept)
-    return Conflict(smallest, _reason(reach, [pins[i] for i in smallest]), _ways_out(reach, pins, smallest, choices))
+    without = [[other for i, other in enumerate(pins) if i != index] for index in smallest]
+    return Conflict(
+        smallest,
+        _reason(reach, [pins[i] for i in smallest]),
+        _ways_out(reach, pins, smallest, choices),
+        not any(reach.keeps(rest) for rest in without),
+    )
 
 
 def _first_hitting(sets: Sequence[frozenset[int]]) -> tuple[int, ...]:

@@ -1,5 +1,7 @@
 """Pins on the beats of a song and the nodes of a graph."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -96,6 +98,11 @@ def test_reports(song, nodes):
         "would do: 2=spin in place of 2=spni",
     ]
     assert way_out(WayOut(1, -2, ""), pins, wishes, song) == "2.00-3.00=walk, 2 beats earlier than 3-4=walk"
+    fixed = replace(nodes, is_whole=nodes.wished(wishes[0]))
+    told = sentences(Conflict((0,), "start", ()), pins, wishes, song, fixed)[0]
+    assert told.endswith(f"by its licence the clip of {wishes[0].text} may not be changed and enters no blend")
+    more = sentences(Conflict((0,), "tempo", (), has_more=True), pins, wishes, song, nodes)
+    assert more[-1] == "other pins conflict too: mend this conflict first"
     told = sentences(Conflict((0, 1), "path", ()), pins, wishes, song, nodes)[0]
     assert told.endswith("keeps them all (1 beat between them)")
     assert "at the same time" in sentences(Conflict((0, 1), "same_time", ()), pins, wishes, song, nodes)[0]

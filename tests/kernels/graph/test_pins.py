@@ -90,11 +90,13 @@ def test_kept_or_the_fewest_that_cannot_be(seed, make_graph, kept_dances):
     for size in range(len(conflict.pin_index)):
         for chosen in combinations(range(len(pins)), size):
             assert kept_dances(graph, beat_s, [pins[i] for i in chosen], costs)
+    without = [[pin for i, pin in enumerate(pins) if i != index] for index in conflict.pin_index]
+    assert conflict.has_more != any(kept_dances(graph, beat_s, rest, costs) for rest in without)
 
 
 def test_the_cases_hold_all_kinds(make_graph):
     """Sets that are kept, conflicts of one, of two and of more pins; poses among both; half- and double-time danced."""
-    sizes, kinds, strides = set(), set(), set()
+    sizes, kinds, strides, more = set(), set(), set(), set()
     for seed in range(220):
         graph, beat_s, pins = random_case(seed, make_graph)
         reach = reach_of(graph, beat_s)
@@ -103,12 +105,14 @@ def test_the_cases_hold_all_kinds(make_graph):
         conflict = find_conflict(reach, pins)
         size = 0 if conflict is None else len(conflict.pin_index)
         sizes.add(size)
+        more |= set() if conflict is None else {conflict.has_more}
         kinds |= {(pin.name.split()[0], size > 0) for pin in pins}
         if conflict is None:
             mask = admitted(pins, len(beat_s) - 1, len(graph.clip_index))
             path = find_path(graph, beat_s, costs=NO_USAGE, starts="any", admissible=mask, step_price=step_price(pins))
             strides |= set(zip(path.motion_span.tolist(), path.beat_span.tolist(), strict=True))
     assert {0, 1, 2, 3} <= sizes
+    assert more == {False, True}
     assert kinds == {(kind, is_refused) for kind in ("label", "not", "style", "pose") for is_refused in (True, False)}
     assert strides == set(STEPS)
 
