@@ -124,8 +124,10 @@ def catalogue(
     is_fixed = [not licences.may_be_joined(name) for name in licence]
     is_whole = np.array(is_fixed or [False])[of_node]
     free = ~(is_whole[graph.source] | is_whole[graph.target])
-    named = (np.array([str(row[c]) for row in facts] or [""])[of_node] for c in ("clip_id", "label", "style"))
-    nodes = Nodes(*named, is_whole)
+    clip_id, label, style = (
+        np.array([str(row[c]) for row in facts] or [""])[of_node] for c in ("clip_id", "label", "style")
+    )
+    nodes = Nodes(clip_id, label, style, is_whole)
     may_be_danced = [
         licences.is_allowed(name, allow) and not (fixed and is_mirrored(clip))
         for name, fixed, clip in zip(licence, is_fixed, clip_ids, strict=True)
