@@ -43,7 +43,7 @@ def report(facts: dict[str, Any]) -> str:
     width = max(len(hit["clip_id"]) for hit in hits)
     lines += [
         f"  {hit['distance']:.3f}  {hit['clip_id']:<{width}}  {hit['start_s']:.2f} to {hit['end_s']:.2f} s  "
-        f"{hit['label']}{', ' + hit['style'] if hit['style'] else ''}{_copied(hit)}"
+        f"{hit['label']}{', ' + hit['style'] if hit['style'] else ''}{_laid(hit)}"
         for hit in hits
     ]
     if "sheet" in facts:
@@ -51,9 +51,9 @@ def report(facts: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _copied(hit: dict[str, Any]) -> str:
+def _laid(hit: dict[str, Any]) -> str:
     apart_m = hit["copy_apart_m"]
-    return "" if apart_m is None else f", a copy {100 * apart_m:.1f} cm off"
+    return "" if apart_m is None else f", joints {100 * apart_m:.1f} cm off"
 
 
 def draw(sheet: Path, catalogue: Catalogue, query: Motion, found: Sequence[Hit]) -> None:

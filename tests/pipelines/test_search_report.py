@@ -12,10 +12,10 @@ def facts():
     return {"query": "day-step_0", "like": [], "hits": [copy, hit | {"copy_apart_m": None}]}
 
 
-def test_a_line_a_hit_and_copies_say_that_they_are_one(facts):
+def test_a_line_a_hit_and_where_the_query_is_laid_over_it_how_far_joints_are_off(facts):
     assert report(facts).splitlines() == [
         "like day-step_0:",
-        "  0.013  day-step_10  0.50 to 2.00 s  step, shy, a copy 0.4 cm off",
+        "  0.013  day-step_10  0.50 to 2.00 s  step, shy, joints 0.4 cm off",
         "  0.250  day-step_1   0.50 to 2.00 s  step",
     ]
 
