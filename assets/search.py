@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from typing import Any
 
 import dagster as dg
 import numpy as np
@@ -103,7 +104,10 @@ def motion_encoder(
         else None,
     }
     table = search_tables.from_encoder(fitted.encoder.arrays(), json.dumps(provenance, sort_keys=True))
-    return Part("", table, metadata={"provenance": dg.MetadataValue.json(provenance)})
+    shown: dict[str, dg.MetadataValue[Any]] = {"provenance": dg.MetadataValue.json(provenance)}
+    if fitted.confusion:
+        shown["confusion_of_held_out"] = dg.MetadataValue.md(search_plots.confusion(fitted.confusion))
+    return Part("", table, metadata=shown)
 
 
 def _examples(clip: Stored, canonical_pose: Stored, settings: SearchSettings) -> list[_Example]:
@@ -206,9 +210,9 @@ def motion_index(clip: Stored, motion_embedding: Stored, progress: dg.ResourcePa
     metadata = {
         "windows": len(vectors),
         "clips": len(start),
-        "first_hit_has_label_ratio": found.first_ratio,
+        "learnt_first_hit_has_label_ratio": found.first_ratio,
         "map": dg.MetadataValue.md(search_plots.catalogue_map(place, labels)),
-        "confusion": dg.MetadataValue.md(search_plots.confusion(found)),
+        "confusion_of_learnt": dg.MetadataValue.md(search_plots.confusion(found)),
     }
     return Index(Part("", table, metadata=metadata), vectors, tracks)
 

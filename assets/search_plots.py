@@ -119,7 +119,7 @@ def contact_sheet(strips: Sequence[tuple[str, Float, Float]], *, n_figures: int 
     strips : title, (F, 22, 3) metres facing +Z, and (F,) seconds of each, F >= 1
     n_figures : int, figures a strip
     """
-    figure = figure_of(1.25 * n_figures + 0.5, 1.75 * max(len(strips), 1) + 0.2)
+    figure = figure_of(n_figures + 0.4, 2.3 * max(len(strips), 1) + 0.2)
     for place, (title, position, time_s) in enumerate(strips):
         axes = figure.add_subplot(max(len(strips), 1), 1, place + 1)
         frames = np.linspace(0, len(position) - 1, min(n_figures, len(position))).round().astype(int)

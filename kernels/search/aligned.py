@@ -129,16 +129,26 @@ def align(query: Track, others: Sequence[Track]) -> list[Alignment]:
             found[c] = min(found[c], _polished(middle, others[c], float(paced.middle_s[i]), float(paced.pace[i])))
     centre_s = (first + (len(middle) - 1) / 2) / QUERY_HZ
     after_s = (len(query) - 1) / QUERY_HZ - centre_s
-    whole = []
-    for (distance_m, middle_s, pace), other in zip(found, others, strict=True):
-        last_s = (len(other) - 1) / TRACK_HZ
-        start_s, end_s = middle_s - centre_s / pace, middle_s + after_s / pace
-        whole.append(Alignment(distance_m, min(max(start_s, 0.0), last_s), min(max(end_s, 0.0), last_s + 1 / TRACK_HZ)))
-    return whole
+    distance_m, middle_s, pace = np.array(found).T
+    last_s = (np.array([len(other) for other in others]) - 1) / TRACK_HZ
+    start_s = np.clip(middle_s - centre_s / pace, 0.0, last_s)
+    end_s = np.clip(middle_s + after_s / pace, 0.0, last_s + 1 / TRACK_HZ)
+    return [Alignment(*row) for row in zip(distance_m.tolist(), start_s.tolist(), end_s.tolist(), strict=True)]
 
 
 def room(query: Track, n_frames: Int) -> Int:
-    """Frames that each of some tracks takes to be laid over, (C,): its own, and room for the query to stand out."""
+    """Count the frames that tracks take to be laid over.
+
+    Parameters
+    ----------
+    query : (T, N_TRACK) float32, at :data:`QUERY_HZ`
+    n_frames : (C,) int, frames of each track
+
+    Returns
+    -------
+    (C,) int64
+        A track's own frames, and room for the query to stand out of it.
+    """
     n = min(len(query), int(_LONGEST_S * QUERY_HZ))
     return np.asarray(n_frames) + _STEP * (n // _EACH + 1)
 
@@ -156,14 +166,19 @@ class _Laid:
     """Tracks laid out one behind the other, with room for a query of some rows to stand out of each."""
 
     def __init__(self, others: Sequence[Track], rows: int) -> None:
-        gap = np.zeros((_STEP * rows, N_TRACK), np.float32)
+        gap = _STEP * rows
         self._length = np.array([len(other) for other in others])
-        self._frames = np.ascontiguousarray(np.concatenate([gap, *(p for o in others for p in (o, gap))]).T)
-        self._begin = len(gap) + np.cumsum(np.append(0, self._length + len(gap)))[:-1]
-        there = np.zeros(self._frames.shape[1], np.float32)
-        for begin, length in zip(self._begin.tolist(), self._length.tolist(), strict=True):
-            there[begin : begin + length] = 1.0
-        self._there, self._size = there, (self._frames**2).sum(axis=0)
+        self._begin = gap + np.cumsum(np.append(0, self._length + gap))[:-1]
+        put = np.repeat(self._begin - np.append(0, np.cumsum(self._length))[:-1], self._length)
+        put += np.arange(len(put))
+        frames = np.concatenate(others)
+        # Behind the joints a one and their squares: one product with a query's rows gives squared distances, and 0 in
+        # the gaps.
+        self._frames = np.zeros((int(self._begin[-1] + self._length[-1]) + gap, N_TRACK + 2), np.float32)
+        self._frames[put, :N_TRACK] = frames
+        self._frames[put, N_TRACK] = 1.0
+        self._frames[put, N_TRACK + 1] = np.einsum("td,td->t", frames, frames)
+        self._there = np.ascontiguousarray(self._frames[:, N_TRACK])
 
     def over(self, query: Track, ways: Sequence[tuple[float, int]]) -> _Best:
         """Lay a query over all at every frame, at some paces and from some phases (frames of the query) on."""
@@ -173,18 +188,22 @@ class _Laid:
             frame = np.arange(phase, len(query) - 1 + 1e-6, _EACH * pace) if len(query) > 1 else np.zeros(1)
             mean, low = self._mean(_at(query, frame))
             least = np.minimum.reduceat(mean, low)
-            for c in np.flatnonzero(least < best.distance_m).tolist():
-                end = low[c + 1] if c + 1 < len(low) else len(mean)
-                first = low[c] + int(mean[low[c] : end].argmin()) - self._begin[c]
-                best.distance_m[c], best.pace[c] = least[c], pace
-                best.middle_s[c] = first / TRACK_HZ + (centre - phase) / QUERY_HZ / pace
+            of = np.repeat(np.arange(len(low)), np.diff(np.append(low, len(mean))))
+            at = np.flatnonzero(mean[low[0] :] == least[of])[::-1]
+            first = np.zeros(len(low), np.int64)
+            first[of[at]] = at + low[0]  # the earliest of equals, written last
+            is_less = least < best.distance_m
+            best.distance_m[is_less], best.pace[is_less] = least[is_less], pace
+            middle_s = (first - self._begin) / TRACK_HZ + (centre - phase) / QUERY_HZ / pace
+            best.middle_s[is_less] = middle_s[is_less]
         return best
 
     def _mean(self, rows: Track) -> tuple[Float, Int]:
         """Mean distance with row 0 over each frame (inf: too little lies over), and each other's first such frame."""
         n = len(rows)
-        squared = (rows**2).sum(axis=1)[:, None] + self._size - 2 * rows @ self._frames
-        apart = np.sqrt(np.maximum(squared, 0.0) * np.float32(1 / len(_TRACKED))) * self._there
+        told = np.concatenate([-2 * rows, (rows**2).sum(axis=1)[:, None], np.ones((n, 1), np.float32)], axis=1)
+        apart = (told * np.float32(1 / len(_TRACKED))) @ self._frames.T
+        np.sqrt(np.maximum(apart, 0.0, out=apart), out=apart)
         offsets = apart.shape[1] - _STEP * (n - 1)
         across, along = apart.strides
         view = np.lib.stride_tricks.as_strided

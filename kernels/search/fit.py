@@ -13,7 +13,7 @@ from kernels.search.augment import mirror
 from kernels.search.describe import describe
 from kernels.search.discriminant import Projection, discriminant, principal, unit
 from kernels.search.encoder import N_DISCRIMINANT, N_PRINCIPAL, Encoder
-from kernels.search.measure import Retrieval, label_folds, retrieval
+from kernels.search.measure import Confusion, Retrieval, confusions, label_folds, retrieval
 from kernels.search.normalise import channels
 from kernels.search.train import Trained, Training
 from kernels.types import Float, Int
@@ -35,12 +35,14 @@ class Fitted:
     kind : "labelled", "unlabelled" or "untrained"
     steps : of the network's training
     validation : measured on clips held out while the number of steps was chosen; None without labels
+    confusion : their labels against those of their nearest clips; None without labels
     """
 
     encoder: Encoder
     kind: str
     steps: int
     validation: Retrieval | None
+    confusion: Confusion | None = None
 
 
 def fit(
@@ -91,10 +93,16 @@ def fit(
     turned = mirrored_labels(motions, of, told, has_travel=how.has_travel)
     takes = np.unique(np.asarray(take if len(take) else range(len(label))), return_inverse=True)[1][rows]
     held = _held_out(of, takes, how.seed)
-    steps, validation = _choose_steps(motions, of, told, turned, how, spread, held, progress)
+    chosen = _choose_steps(motions, of, told, turned, how, spread, held, progress)
+    steps = chosen.steps
     weights = training.train(motions, of, how=replace(how, steps=steps), mirrored_label=turned, progress=progress)
     telling = mirrored_discriminant(motions, of, told, turned, has_travel=how.has_travel)
-    return Fitted(Encoder(LABELLED, how.has_travel, spread, telling, weights), "labelled", steps, validation)
+    encoder = Encoder(LABELLED, how.has_travel, spread, telling, weights)
+    if chosen.distance is None:
+        return Fitted(encoder, "labelled", steps, None)
+    asked, known = names[number[rows[held]]].tolist(), names[number[rows[~held]]].tolist()
+    found = retrieval(chosen.distance, asked, known), confusions(chosen.distance, asked, known)
+    return Fitted(encoder, "labelled", steps, *found)
 
 
 def statistics_of(position_xyz_m: Sequence[Float], *, has_travel: bool) -> Float:
@@ -164,6 +172,15 @@ def _held_out(label: Int, take: Int, seed: int) -> NDArray[np.bool_]:
     return np.isin(take, take[first][fold]) & ~is_spared
 
 
+@dataclass(frozen=True, eq=False)
+class _Chosen:
+    """Steps to train for; and how good that was, with the distances from what was held out, where it was measured."""
+
+    steps: int
+    score: float = -1.0
+    distance: Float | None = None
+
+
 def _choose_steps(
     motions: Sequence[Float],
     label: Int,
@@ -173,14 +190,14 @@ def _choose_steps(
     spread: Projection,
     held: NDArray[np.bool_],
     progress: Callable[[], None] | None,
-) -> tuple[int, Retrieval | None]:
+) -> _Chosen:
     """Hold clips out, and find after how many steps the network finds their like best."""
     kept = ~held
     if not held.any() or len(np.unique(label[kept])) < 2:
-        return how.steps, None
+        return _Chosen(how.steps)
     shown = [motions[i] for i in np.flatnonzero(kept).tolist()]
     telling = mirrored_discriminant(shown, label[kept], statistics[kept], turned[kept], has_travel=how.has_travel)
-    best = (-1.0, how.steps, Retrieval(0.0, 0.0, 0))
+    best = _Chosen(how.steps)
     worse = 0
 
     def watch(done: int, weights: Trained) -> bool:
@@ -190,9 +207,9 @@ def _choose_steps(
         distance = np.sqrt(np.maximum(2 - 2 * vectors[held].astype(np.float64) @ vectors[kept].T, 0.0))
         found = retrieval(distance, label[held].tolist(), label[kept].tolist())
         score = found.first_ratio + found.mean_precision_ratio
-        worse = 0 if score > best[0] else worse + 1
-        if score > best[0]:
-            best = (score, done, found)
+        worse = 0 if score > best.score else worse + 1
+        if score > best.score:
+            best = _Chosen(done, score, distance)
         return worse >= _PATIENCE
 
     training.train(
@@ -203,4 +220,4 @@ def _choose_steps(
         watch=watch,
         progress=progress,
     )
-    return best[1], best[2]
+    return best

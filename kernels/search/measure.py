@@ -117,6 +117,27 @@ class Confusion:
         return float(np.trace(self.count) / max(int(self.count.sum()), 1))
 
 
+def confusions(distance: Float, query_label: Sequence[str], label: Sequence[str]) -> Confusion:
+    """Count the label of each query's nearest clip.
+
+    Parameters
+    ----------
+    distance : (Q, N) float, N >= 1
+        Ties go to the earlier row of the catalogue.
+    query_label, label : Q and N names
+
+    Returns
+    -------
+    Confusion
+        Of the labels that are asked for or found; none where Q is 0.
+    """
+    nearest = np.asarray(label, str)[distance.argmin(axis=1)]
+    names, number = np.unique(np.concatenate([np.asarray(query_label, str), nearest]), return_inverse=True)
+    count = np.zeros((len(names), len(names)), np.int64)
+    np.add.at(count, (number[: len(nearest)], number[len(nearest) :]), 1)
+    return Confusion(tuple(names.tolist()), count)
+
+
 def leave_one_out(vector: NDArray[np.floating], label: Sequence[str]) -> Confusion:
     """Look every clip up among the others.
 

@@ -115,14 +115,13 @@ def nearest_clips(
     score = np.minimum.reduceat(distance, start, axis=1).mean(axis=0)
     best = _least(score, max(_SPARE * k, _MOST_ALIGNED if copies else 0))
     laid = dict(zip(best.tolist(), copies(best) if copies and len(best) else (), strict=False))
+    share = {c: min(alignment.distance_m / COPY_M, 1.0) for c, alignment in laid.items()}
     found = []
-    for rank, c in enumerate(best.tolist()):
-        copied = laid[c] if c in laid and laid[c].distance_m < COPY_M else None
-        if rank < _SPARE * k or copied:
-            hit = _hit(vector, query, c, start[c], end[c], distance, at)
-            found.append(
-                replace(hit, distance=hit.distance * copied.distance_m / COPY_M, copied=copied) if copied else hit
-            )
+    for i in np.argsort(score[best] * [share.get(c, 1.0) for c in best.tolist()], kind="stable")[: _SPARE * k].tolist():
+        c = int(best[i])
+        hit = _hit(vector, query, c, start[c], end[c], distance, at)
+        is_copy = share.get(c, 1.0) < 1
+        found.append(replace(hit, distance=hit.distance * share[c], copied=laid[c]) if is_copy else hit)
     return sorted(found, key=lambda h: (h.distance, h.clip))[:k]
 
 

@@ -102,6 +102,13 @@ def test_a_file_of_the_studio_is_its_clip(searchable):
     assert by_path["hits"] == ask(searchable, "day-twist_2")["hits"]
 
 
+def test_a_file_of_the_studio_is_its_clip_by_whatever_way_it_is_reached(searchable, tmp_path):
+    wanted = ask(searchable, "day-twist_2")["hits"]
+    (tmp_path / "link").symlink_to(searchable)
+    for way in (searchable / "clips" / ".." / "clips" / "day", tmp_path / "link" / "clips" / "day"):
+        assert ask(searchable, str(way / "twist_2.bvh"))["hits"] == wanted
+
+
 def test_a_stretch_is_looked_for_and_hits_are_stretches(searchable):
     found = ask(searchable, "day-unsaid@2.5-4", k=12)
     long = [h for h in found["hits"] if h["clip_id"] == "day-unsaid"]
@@ -139,6 +146,7 @@ def test_a_sheet_is_drawn(searchable, tmp_path):
         ({"query": "nowhere.bvh"}, "want a clip of this studio or a BVH file"),
         ({"query": "day-step_0@3-2"}, "want an end after its start"),
         ({"query": "day-step_0@90-91"}, "begins after its end"),
+        ({"query": "day-step_0@1.5"}, "want a stretch in seconds as in day-step_0@2.5-4, got @1.5"),
         ({"query": "day-step_0", "label": ("stp",)}, "near are step"),
         ({}, "got nothing to look for"),
     ],

@@ -1,5 +1,7 @@
 """Fitting to catalogues of every kind."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,8 @@ def test_labels_are_learnt_and_validated(dances):
     fitted = fit(motions, labels, how=SHORT)
     assert fitted.kind == "labelled"
     assert fitted.validation.n_queries >= 2
+    assert fitted.confusion.count.sum() == fitted.validation.n_queries
+    assert set(fitted.confusion.names) <= set(labels)
     assert 0 < fitted.steps <= 30
     assert leave_one_out(vectors(fitted, motions), labels).first_ratio == 1
 
@@ -67,7 +71,13 @@ def test_windows_of_one_take_are_held_out_together(dances):
     """One take for all: there is nothing to hold out, and training goes its whole way."""
     motions, labels = dances
     fitted = fit(motions, labels, take=["one"] * 16, how=SHORT)
-    assert (fitted.steps, fitted.validation) == (30, None)
+    assert (fitted.steps, fitted.validation, fitted.confusion) == (30, None, None)
+
+
+def test_too_short_a_training_to_look_in_between_claims_no_figure(dances):
+    motions, labels = dances
+    fitted = fit(motions, labels, how=replace(SHORT, steps=10))
+    assert (fitted.kind, fitted.steps, fitted.validation) == ("labelled", 10, None)
 
 
 def test_labels_that_mirror_each_other_are_found(dances):

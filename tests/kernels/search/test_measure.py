@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.search.measure import Retrieval, group_folds, joined, label_folds, leave_one_out, retrieval
+from kernels.search.measure import Retrieval, confusions, group_folds, joined, label_folds, leave_one_out, retrieval
 
 
 def test_average_precision_of_a_known_ranking():
@@ -44,6 +44,14 @@ def test_labels_are_spread_evenly():
     assert np.sum(folds, axis=0).tolist() == [1] * 19
     assert {int((label[fold] == 0).sum()) for fold in folds} == {4}
     assert {int((label[fold] == 1).sum()) for fold in folds} == {2}
+
+
+def test_labels_of_queries_are_counted_against_those_found():
+    distance = np.array([[0.1, 0.5, 0.9], [0.4, 0.3, 0.9], [0.5, 0.5, 0.6]])
+    found = confusions(distance, ["a", "a", "new"], ["a", "b", "never"])
+    assert found.names == ("a", "b", "new")
+    np.testing.assert_array_equal(found.count, [[1, 1, 0], [0, 0, 0], [1, 0, 0]])
+    assert confusions(np.zeros((0, 3)), [], ["a", "b", "c"]).names == ()
 
 
 def test_confusions_are_counted_by_label_and_label_of_the_nearest():
