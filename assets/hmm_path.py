@@ -248,7 +248,7 @@ def by_hmm(
         "as_the_model_alone_ratio": _shared(spans, alone, len(music.log_likelihood)),
         "music_adds": dancer.evidence.music_adds,
         "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
-        "states": dg.MetadataValue.md(hmm_plots.timeline(music.grid_s[spans.start], spans.state, song.grid_s)),
+        "states": dg.MetadataValue.md(hmm_plots.timeline(edge_s, spans.state, song.grid_s)),
     }
     spanned = zip(spans.start[span_of].tolist(), spans.length[span_of].tolist(), strict=True)
     served = [hmm_pins.served(pins, music.parts, start, length) for start, length in spanned]

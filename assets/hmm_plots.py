@@ -101,12 +101,12 @@ def evidence(found: Evidence, clips: Sequence[str]) -> str:
     return markdown(("performance", "motions", "with its music", "without", "with other music"), rows)
 
 
-def timeline(song_s: Float, state: Int, edge_s: Float) -> str:
-    """Show which basic motion is danced when; beats as faint lines."""
+def timeline(edge_s: Float, state: Int, beat_s: Float) -> str:
+    """Show which basic motion is danced when, (S,) between (S + 1,) edges; beats as faint lines."""
     figure = figure_of(12, 2.4)
     axes = figure.add_subplot()
-    axes.vlines(edge_s, -0.5, float(state.max(initial=0)) + 0.5, color=SOFT, linewidth=0.3)
-    axes.step(song_s, state, where="post", color=INK, linewidth=1.0)
+    axes.vlines(beat_s, -0.5, float(state.max(initial=0)) + 0.5, color=SOFT, linewidth=0.3)
+    axes.stairs(state, edge_s, baseline=None, color=INK, linewidth=1.0)
     axes.set_xlabel("seconds", fontsize=8)
     axes.set_ylabel("basic motion", fontsize=8)
     plain(axes)

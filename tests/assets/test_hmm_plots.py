@@ -21,7 +21,13 @@ def test_pictures_are_drawn_and_the_same_twice():
     model = learn([Performed(np.arange(9) % 3, heard)], 3, (47, 5), smoothing=smoothing)
     assert "data:image/png" in hmm_plots.model(model, smoothing)
     assert "data:image/png" in hmm_plots.drum_roll(Hits(np.array([0.5]), np.array([36]), np.array([90])))
-    assert "data:image/png" in hmm_plots.timeline(np.array([0.0, 1.0]), np.array([0, 1]), np.arange(3.0))
+    assert "data:image/png" in hmm_plots.timeline(np.arange(3.0), np.array([0, 1]), np.arange(3.0))
+
+
+def test_the_last_motion_is_drawn_to_its_end():
+    edge_s, beats_s = np.arange(3.0), np.arange(3.0)
+    ends_later = hmm_plots.timeline(np.array([0.0, 1.0, 1.5]), np.array([0, 1]), beats_s)
+    assert hmm_plots.timeline(edge_s, np.array([0, 1]), beats_s) != ends_later
 
 
 def test_nothing_to_draw_is_said():
