@@ -67,7 +67,7 @@ def dance_notes(report: dict[str, Any]) -> list[str]:
     if any(_failed(wanted, name) and wanted[name]["value"] > 1.5 for name in _ROUGH):
         notes.append(
             "of the recordings that fit its beats some join only roughly: rough themselves, or calm beside a wilder "
-            "one; add clips danced near its tempo"
+            "one; add clips danced near its tempo, or try wider blends (dance.blend_s = 0.55)"
         )
     if any(_failed(wanted, name) for name in ("added_foot_slide_cm_per_s", "knee_pop_ratio")):
         notes.append(
