@@ -19,11 +19,14 @@ from assets.hmm_recordings import choose_recordings, ends_of
 from assets.hmm_tables import ClipMotions
 from assets.lineage import Stored
 from kernels.assembly.timing import blend_widths, trim
-from kernels.hmm import decode, durations
+from kernels.hmm import durations
+from kernels.hmm.decode import Chain, decode_varied
 from kernels.hmm.evidence import Evidence
 from kernels.hmm.instances import Motions
+from kernels.hmm.links import link
 from kernels.hmm.model import Model
 from kernels.hmm.pins import SpanReach
+from kernels.hmm.places import Places, Wish, crowded_cost, keep_wishes, place
 from kernels.hmm.seams import Ends
 from kernels.hmm.viterbi import Spans, best_spans, sample_spans
 from kernels.matching.path import to_choreography
@@ -175,7 +178,7 @@ def by_hmm(
     motions, weights = dancer.motions, settings.hmm_path
     music = listen(dancer, percussion, melody, song.grid_s, settings)
     ends = ends_of(motions, dancer.clip_ids, canonical_pose, blend_s=settings.dance.blend_s)
-    places = decode.place(
+    places = place(
         motions,
         music.grid_s,
         music.log_likelihood,
@@ -188,10 +191,10 @@ def by_hmm(
     if not reach.is_danceable:
         raise dg.Failure(_no_length(music, motions.end_s - motions.start_s), allow_retries=False)
     pins = hmm_pins.kept_or_refused(reach, dancer.nodes, song, asked)
-    wishes = [decode.Wish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
+    wishes = [Wish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
     wish_price = hmm_pins.price(asked) / music.parts
-    wished = decode.keep_wishes(places, wishes, price=wish_price) if wishes else places
-    crowded = decode.crowded_cost(music.grid_s, song.duration_s, blend_s=settings.dance.blend_s)
+    wished = keep_wishes(places, wishes, price=wish_price) if wishes else places
+    crowded = crowded_cost(music.grid_s, song.duration_s, blend_s=settings.dance.blend_s)
     lasting = _lasting(dancer, music, wished)
     model = dancer.model
     if warmth > 0:
@@ -245,7 +248,7 @@ def by_hmm(
         "as_the_model_alone_ratio": _shared(spans, alone, len(music.log_likelihood)),
         "music_adds": dancer.evidence.music_adds,
         "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
-        "states": dg.MetadataValue.md(hmm_plots.timeline(music.grid_s[spans.start], spans.state, song.grid_s)),
+        "states": dg.MetadataValue.md(hmm_plots.timeline(edge_s, spans.state, song.grid_s)),
     }
     spanned = zip(spans.start[span_of].tolist(), spans.length[span_of].tolist(), strict=True)
     served = [hmm_pins.served(pins, music.parts, start, length) for start, length in spanned]
@@ -264,7 +267,7 @@ def listen(dancer: Dancer, percussion: pa.Table, melody: pa.Table, beat_s: Float
     return Music(grid_s, parts, np.arange(len(grid_s)) % parts == 0, heard.log_likelihood(dancer.model))
 
 
-def _lasting(dancer: Dancer, music: Music, places: decode.Places) -> Float:
+def _lasting(dancer: Dancer, music: Music, places: Places) -> Float:
     """Log probabilities of how long basic motions last, (G, D, K); -inf where no recording may be danced."""
     motions, n = dancer.motions, dancer.model.n_states
     length_s = motions.end_s - motions.start_s
@@ -275,17 +278,17 @@ def _lasting(dancer: Dancer, music: Music, places: decode.Places) -> Float:
 
 
 def _decoded(
-    dancer: Dancer, places: decode.Places, ends: Ends, crowded: Float, settings: Settings, seed: int
-) -> tuple[Spans, decode.Chain]:
+    dancer: Dancer, places: Places, ends: Ends, crowded: Float, settings: Settings, seed: int
+) -> tuple[Spans, Chain]:
     """Find the cheapest dance in recordings."""
     model, motions, weights = dancer.model, dancer.motions, settings.hmm_path
     price = np.zeros(len(motions.state))
     if not len(dancer.evidence.n_motions):
         price = np.random.default_rng(seed).exponential(UNSURE, len(price))
     against_usual = model.log_transition + model.entropy_rate
-    chain = decode.decode_varied(
+    chain = decode_varied(
         motions,
-        decode.link(motions, ends, against_usual, seam_weight=weights.seam_weight),
+        link(motions, ends, against_usual, seam_weight=weights.seam_weight),
         places,
         model.log_initial,
         against_usual,

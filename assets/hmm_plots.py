@@ -16,6 +16,7 @@ from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Float, Int
 
 _MOST_SHOWN = 64
+_INCHES_A_METRE, _WIDEST = 0.6, 13.0
 
 
 def drum_roll(hits: Hits) -> str:
@@ -42,17 +43,25 @@ def centroids(states: States, examples: Sequence[str]) -> str:
     table = markdown(("state", "motions", "reach, m", "for example"), rows)
     tried = markdown(("states tried", "clearness"), list(states.tried)) if states.tried else ""
     poses = to_poses(states.centroid[:_MOST_SHOWN])
-    across = min(8, len(poses))
+    # One scale for all, wide enough for those that travel: the front on the left, the side on the right.
+    front, side = -0.1 - poses[..., 0].max(), 0.1 - poses[..., 2].min()
+    edge_m = (poses[..., 0].min() + front - 0.1, poses[..., 2].max() + side + 0.1)
+    width = _INCHES_A_METRE * (edge_m[1] - edge_m[0])
+    across = int(np.clip(_WIDEST // width, 1, min(8, len(poses))))
     down = -(-len(poses) // across)
-    figure = figure_of(1.6 * across, 2.0 * down)
+    figure = figure_of(width * across, (_INCHES_A_METRE * 2.3 + 0.2) * down)
     drawn = np.ravel(np.array(figure.subplots(down, across, squeeze=False)))
     for k, axes in enumerate(drawn):
-        axes.axis("off")
         if k >= len(poses):
+            axes.axis("off")
             continue
+        # A frame says which front and which side belong together.
+        axes.set(xticks=[], yticks=[], xlim=edge_m, ylim=(-0.1, 2.2))
+        for edge in axes.spines.values():
+            edge.set(color=SOFT, linewidth=0.5)
         for pose, colour in zip(poses[k], (SOFT, COOL, WARM), strict=True):
-            _stick(axes, pose, 0, -0.5, colour)
-            _stick(axes, pose, 2, 0.7, colour)
+            _stick(axes, pose, 0, front, colour)
+            _stick(axes, pose, 2, side, colour)
         axes.set_title(f"{k} ({int(states.count[k])})", fontsize=7, pad=1)
         axes.set_aspect("equal")
     shown = picture(png(figure), "basic motions, front and side: start grey, launch blue, end orange")
@@ -69,7 +78,8 @@ def _stick(axes, pose: Float, axis: int, shift_m: float, colour: str) -> None:  
 def model(found: Model, smoothing: Smoothing) -> str:
     """Show transitions and emissions as matrices, dark for probable, and how the smoothing was chosen."""
     emission = np.exp(found.log_emission[0])
-    heard = np.flatnonzero(emission.max(axis=0) > 1.5 * np.median(emission))
+    # What was never heard has the least share a motion gives to any key.
+    heard = np.flatnonzero((emission > 1.5 * emission.min(axis=1, keepdims=True)).any(axis=0))
     heard = heard if len(heard) else np.arange(emission.shape[1])
     figure = figure_of(13, 4.2)
     parts = (
@@ -81,7 +91,9 @@ def model(found: Model, smoothing: Smoothing) -> str:
     for axes, (title, values, names) in zip(
         figure.subplots(1, 3, gridspec_kw={"width_ratios": widths}), parts, strict=True
     ):
-        axes.imshow(values, cmap="Greys", vmin=0, aspect="auto", interpolation="nearest")
+        # Where all are alike they are no darker than half: nothing is probable there.
+        darkest = max(float(values.max()), 2.0 / values.shape[1])
+        axes.imshow(values, cmap="Greys", vmin=0, vmax=darkest, aspect="auto", interpolation="nearest")
         axes.set_title(title, fontsize=8)
         if len(names) <= 48:
             axes.set_xticks(range(len(names)), names, fontsize=6, rotation=90)
@@ -101,12 +113,12 @@ def evidence(found: Evidence, clips: Sequence[str]) -> str:
     return markdown(("performance", "motions", "with its music", "without", "with other music"), rows)
 
 
-def timeline(song_s: Float, state: Int, edge_s: Float) -> str:
-    """Show which basic motion is danced when; beats as faint lines."""
+def timeline(edge_s: Float, state: Int, beat_s: Float) -> str:
+    """Show which basic motion is danced when, (S,) between (S + 1,) edges; beats as faint lines."""
     figure = figure_of(12, 2.4)
     axes = figure.add_subplot()
-    axes.vlines(edge_s, -0.5, float(state.max(initial=0)) + 0.5, color=SOFT, linewidth=0.3)
-    axes.step(song_s, state, where="post", color=INK, linewidth=1.0)
+    axes.vlines(beat_s, -0.5, float(state.max(initial=0)) + 0.5, color=SOFT, linewidth=0.3)
+    axes.stairs(state, edge_s, baseline=None, color=INK, linewidth=1.0)
     axes.set_xlabel("seconds", fontsize=8)
     axes.set_ylabel("basic motion", fontsize=8)
     plain(axes)

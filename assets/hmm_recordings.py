@@ -12,8 +12,9 @@ from assets import tables
 from assets.lineage import Stored
 from kernels.graph.features import beat_features
 from kernels.hmm import instances
-from kernels.hmm.decode import Chain, Places, missed_beats
+from kernels.hmm.decode import Chain
 from kernels.hmm.instances import Motions
+from kernels.hmm.places import Places, missed_beats
 from kernels.hmm.seams import REACH_S, Ends, concatenate_ends, limb_paths, own_cost, seam_cost
 from kernels.hmm.viterbi import Spans
 from kernels.matching.path import Candidates, Chosen, continues

@@ -51,7 +51,7 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
         "pins": _pin_facts(studio, song, method, steps),
     }
     if method == "hmm":
-        model = hmm_report.model_facts(studio.lake)
+        model = hmm_report.model_facts(studio.lake, subject=studio.settings().choreography_model.subject)
         facts["model"] = model | {"notes": [*model["notes"], *hmm_report.dance_notes(report)]}
     if alternative_number(method) > 1:
         facts |= _difference(studio, song, base_method(method), steps)

@@ -6,20 +6,30 @@ from assets import hmm_tables
 from pipelines.lake import Lake
 
 _NOBODY = (
-    "no clip was danced to a song of this studio: motions follow each other as in the clips, drawn anew for every "
+    "no clip{of} was danced to a song of this studio: motions follow each other as in the clips, drawn anew for every "
     "seed, and the music gives no more than its beats; name the song in clips.csv (performed_to), or give both files "
     "one name"
 )
 _FEW = "the performances are too short to tell whether their music matters: nothing could be held out; add longer ones"
 
 
-def model_facts(lake: Lake) -> dict[str, Any]:
-    """Gather facts of the model: performances, what the music adds, and sentences a user should read."""
-    n_performances = lake.table("performance").num_rows
+def model_facts(lake: Lake, *, subject: str = "") -> dict[str, Any]:
+    """Gather facts of the model: performances, what the music adds, and sentences a user should read.
+
+    Parameters
+    ----------
+    lake : Lake
+    subject : setting ``choreography_model.subject``, whose performances alone were learned from; all where empty
+    """
+    performed = {row["clip_id"] for row in lake.table("performance").to_pylist()}
+    if subject:
+        clips = [row for key in lake.keys("clip") for row in lake.table("clip", key).to_pylist()]
+        performed &= {row["clip_id"] for row in clips if row["subject"] == subject}
+    n_performances = len(performed)
     found = hmm_tables.to_evidence(lake.table("music_evidence"))
     states = lake.table("basic_motion").num_rows
     if not n_performances:
-        notes = [_NOBODY]
+        notes = [_NOBODY.format(of=f" of {subject}" if subject else "")]
     elif not found.n_motions.any():
         notes = [_FEW]
     elif not found.music_adds:
@@ -57,7 +67,7 @@ def dance_notes(report: dict[str, Any]) -> list[str]:
     if any(_failed(wanted, name) and wanted[name]["value"] > 1.5 for name in _ROUGH):
         notes.append(
             "of the recordings that fit its beats some join only roughly: rough themselves, or calm beside a wilder "
-            "one; add clips danced near its tempo"
+            "one; add clips danced near its tempo, or try wider blends (dance.blend_s = 0.55)"
         )
     if any(_failed(wanted, name) for name in ("added_foot_slide_cm_per_s", "knee_pop_ratio")):
         notes.append(

@@ -186,8 +186,13 @@ class BasicMotionSettings(_Checked):
 
     states: int = key(0, "Kinds of motions; 0: chosen by how clearly they differ.", least=0, most=200)
     shortest_s: float = key(0.25, "No motion is shorter.", least=0.1, most=1.0)
-    longest_s: float = key(2.0, "No motion is longer.", least=1.0, most=8.0)
+    longest_s: float = key(2.0, "No motion is longer; at least twice shortest_s.", least=1.0, most=8.0)
     seed: int = key(0, "Where the clusters start.", least=0)
+
+    def __post_init__(self) -> None:
+        check(self)
+        if self.longest_s < 2 * self.shortest_s:
+            raise ValueError(f"longest_s: want at least twice shortest_s ({self.shortest_s:g}), got {self.longest_s:g}")
 
 
 @dataclass(frozen=True)

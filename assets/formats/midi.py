@@ -144,7 +144,11 @@ def parse(data: bytes, *, name: str = "midi", limit_s: float = LONGEST_S) -> Mid
     if data[:4] == b"RIFF" and data[8:12] == b"RMID":
         start = data.find(b"MThd")
         data = data[start:] if start >= 0 else b""
-    if data[:4] != b"MThd" or len(data) < 14:
+    if data[:4] == b"MThd" and len(data) < 14:
+        raise FormatError(
+            name, 0, f"want a header of 14 bytes, got {len(data)} bytes in all: cut short; export the song again"
+        )
+    if data[:4] != b"MThd":
         raise FormatError(name, 0, f"want a MIDI file that starts with MThd, got {data[:4]!r}; export the song again")
     header_length, kind, _, division = struct.unpack(">IHHH", data[4:14])
     if header_length < 6 or kind > 2:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.graph.pins import Pin
-from kernels.hmm.decode import Places
+from kernels.hmm.places import Places
 
 Mask = NDArray[np.bool_]
 

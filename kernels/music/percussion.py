@@ -245,11 +245,10 @@ def loudest_in(hits: Hits, edge_s: Float, *, ahead_s: float = 0.0) -> Float:
     """
     counts = np.zeros((max(len(edge_s) - 1, 0), N_KEYS))
     at = np.searchsorted(edge_s - ahead_s, hits.time_s, side="right") - 1
-    for i in range(len(counts)):
-        here = np.flatnonzero(at == i)
-        if len(here):
-            best = min(here.tolist(), key=lambda h: (-int(hits.velocity[h]), int(hits.key_number[h])))
-            counts[i, hits.key_number[best] - FIRST_KEY] = 1.0
+    order = np.lexsort((hits.key_number, -hits.velocity, at))
+    order = order[(at[order] >= 0) & (at[order] < len(counts))]
+    interval, first = np.unique(at[order], return_index=True)
+    counts[interval, hits.key_number[order[first]] - FIRST_KEY] = 1.0
     return counts
 
 

@@ -11,7 +11,7 @@ from kernels.music.notes import sorted_notes
 from kernels.synthetic import performance as made_up
 from pipelines import commands
 from pipelines.collection import freshness
-from pipelines.hmm_report import dance_notes
+from pipelines.hmm_report import dance_notes, model_facts
 from pipelines.resources import NoProgress, StudioFolder
 
 RULES = made_up.hidden_rules(seed=4)
@@ -148,6 +148,14 @@ def test_where_nobody_danced_to_a_song_the_user_is_told(tmp_path):
     assert "performed_to" in outcome.facts["model"]["notes"][0]
     assert not outcome.facts["model"]["music_adds"]
     assert "no clip was danced to a song" in outcome.report
+
+
+def test_what_one_subject_performed_is_counted_and_nobody_is_told(danced):
+    store = lake(danced[0])
+    assert model_facts(store, subject="sumire")["performances"] == 1
+    nobody = model_facts(store, subject="kaede")
+    assert nobody["performances"] == 0
+    assert "no clip of kaede was danced to a song" in nobody["notes"][0]
 
 
 def test_build_makes_the_model_only_where_it_is_used(tmp_path, build):

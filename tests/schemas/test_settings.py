@@ -4,7 +4,15 @@ from dataclasses import fields, is_dataclass
 
 import pytest
 
-from schemas.settings import BeatsBrief, Brief, DanceSettings, MotionBeatSettings, MotionGraphSettings, Settings
+from schemas.settings import (
+    BasicMotionSettings,
+    BeatsBrief,
+    Brief,
+    DanceSettings,
+    MotionBeatSettings,
+    MotionGraphSettings,
+    Settings,
+)
 
 
 def declared(record):
@@ -28,6 +36,11 @@ def test_every_key_has_a_meaning(record):
         (MotionBeatSettings, {"method": "guess"}, "want one of fft, autocorrelation, got 'guess'"),
         (MotionBeatSettings, {"component": 0}, "component: want 1 to 22, got 0"),
         (MotionGraphSettings, {"neighbours": -1}, "neighbours"),
+        (
+            BasicMotionSettings,
+            {"shortest_s": 0.8, "longest_s": 1.0},
+            r"longest_s: want at least twice shortest_s \(0.8\)",
+        ),
         (DanceSettings, {"frame_rate_hz": 1000.0}, "want 1 to 240"),
         (DanceSettings, {"blend_s": float("nan")}, "blend_s: want a finite number, got nan"),
         (DanceSettings, {"blend_s": float("inf")}, "blend_s: want a finite number, got inf"),

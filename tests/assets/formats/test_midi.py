@@ -263,3 +263,8 @@ def test_notes_agree_with_another_reader(data_dir):
         got = sorted(zip(ours.start_s.tolist(), ours.key_number.tolist(), ours.velocity.tolist(), strict=True))
         assert len(got) == len(want)
         np.testing.assert_allclose([g[0] for g in got], [w[0] for w in want], atol=1e-3)
+
+
+def test_a_file_cut_within_its_header_is_told_so():
+    with pytest.raises(FormatError, match=r"want a header of 14 bytes, got 9 bytes in all: cut short"):
+        midi.parse(b"MThd\0\0\0\x06\0")

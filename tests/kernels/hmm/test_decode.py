@@ -4,57 +4,16 @@ import numpy as np
 import pytest
 
 from kernels.hmm import decode as decoding
-from kernels.hmm.decode import (
-    FAR,
-    MISSED_BEAT,
-    Links,
-    Places,
-    Wish,
-    crowded_cost,
-    decode,
-    decode_varied,
-    keep_wishes,
-    link,
-    missed_beats,
-    place,
-)
+from kernels.hmm.decode import FAR, decode, decode_varied
 from kernels.hmm.instances import Motions
-from kernels.hmm.seams import Ends
+from kernels.hmm.links import Links, link
+from kernels.hmm.places import Places, place
 from kernels.hmm.viterbi import InfeasibleSpansError, viterbi
-
-
-def some_motions(n_clips=2, n_each=3, length_s=0.5):
-    start = np.tile(length_s * np.arange(n_each), n_clips)
-    state = np.arange(n_clips * n_each) % 2
-    return Motions(np.repeat(np.arange(n_clips), n_each), state, start, start + length_s)
 
 
 def some_model(seed):
     rng = np.random.default_rng(seed)
     return np.log(rng.dirichlet(np.ones(2))), np.log(rng.dirichlet(np.ones(2), 2))
-
-
-def some_ends(motions, seed=0):
-    n = len(motions.state)
-    rng = np.random.default_rng(seed)
-    zero = np.zeros(n)
-    start, end = rng.normal(0, 0.1, (n, 4)), rng.normal(0, 0.1, (n, 4))
-    one = np.ones(n)
-    return Ends(start, end, np.zeros((n, 4, 5, 3)), np.zeros((n, 4, 5, 3)), zero, zero, zero, one * 1e9, zero, zero)
-
-
-def places_of(motions, n=4, longest=2, seed=0):
-    rng = np.random.default_rng(seed)
-    grid = 0.25 * np.arange(n + longest)
-    log_music = np.log(rng.uniform(0.1, 1, (n, 2)))
-    return place(
-        motions,
-        grid,
-        log_music,
-        longest=longest,
-        is_beat=np.arange(len(grid)) % 2 == 0,
-        accent=rng.uniform(0, 1, len(motions.state)),
-    )
 
 
 def every_dance(places, motions, links, log_initial, log_transition, price, crowded):
@@ -82,7 +41,7 @@ def every_dance(places, motions, links, log_initial, log_transition, price, crow
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_no_dance_is_cheaper(seed):
+def test_no_dance_is_cheaper(seed, some_motions, some_ends, places_of):
     motions = some_motions(length_s=0.25 if seed % 2 else 0.5)
     log_initial, log_transition = some_model(seed)
     places = places_of(motions, seed=seed)
@@ -112,44 +71,7 @@ def test_with_one_recording_a_state_and_free_seams_it_is_the_plain_model(monkeyp
     assert cost == pytest.approx(-log_p)
 
 
-def test_what_goes_on_in_its_clip_has_no_seam():
-    motions = some_motions()
-    links = link(motions, some_ends(motions), np.log(np.full((2, 2), 0.5)), seam_weight=1.0)
-    into = {
-        (int(links.source[e]), j): (float(links.cost[e]), bool(links.is_seam[e]))
-        for j in range(6)
-        for e in range(links.first[j], links.first[j + 1])
-    }
-    assert into[0, 1] == (pytest.approx(np.log(2)), False)
-    assert into[0, 2][1]
-    assert (3, 3) not in into
-
-
-def test_beats_passed_and_beats_ended_on():
-    beat = np.array([True, False, True, False, True])
-    found = missed_beats(beat, np.array([0, 0, 0]), np.array([1, 2, 4]), np.array([0.0, 0.25, 1.0]))
-    np.testing.assert_allclose(found, [0.0, 0.75 * MISSED_BEAT, MISSED_BEAT])
-
-
-def test_wishes_close_or_price_what_they_do_not_admit():
-    motions = some_motions()
-    places = places_of(motions)
-    wish = Wish(1, 3, np.arange(6) < 3)
-    kept = keep_wishes(places, [wish])
-    assert set(kept.at[1][1][0].tolist()) == {0, 1, 2}
-    assert set(kept.at[3][1][0].tolist()) == set(range(6))
-    soft = keep_wishes(places, [wish], price=0.5)
-    np.testing.assert_allclose(soft.at[1][1][1] - places.at[1][1][1], np.where(np.arange(6) < 3, 0.0, 1.0))
-
-
-def test_ends_of_the_song_are_crowded():
-    np.testing.assert_allclose(
-        crowded_cost(np.array([-0.1, 0.1, 1.0, 1.9, 2.1]), 2.0, blend_s=0.4),
-        [decoding.CROWDED, decoding.CROWDED / 2, 0, decoding.CROWDED / 2, decoding.CROWDED],
-    )
-
-
-def test_where_nothing_fits_it_is_told_from_where():
+def test_where_nothing_fits_it_is_told_from_where(some_motions, some_ends, places_of):
     motions = some_motions()
     places = places_of(motions)
     none = np.zeros(0, np.int64)
@@ -169,7 +91,7 @@ def test_where_nothing_fits_it_is_told_from_where():
     assert told.value.interval == 2
 
 
-def test_showing_the_same_again_is_priced(monkeypatch):
+def test_showing_the_same_again_is_priced(monkeypatch, some_motions):
     """Two clips that may be danced on end, the second a little dearer; the song has room for both."""
     motions = some_motions(n_clips=2, n_each=2)
     motions = Motions(motions.clip_index, np.zeros(4, np.int64), motions.start_s, motions.end_s)
@@ -194,13 +116,3 @@ def test_showing_the_same_again_is_priced(monkeypatch):
     free = decode_varied(motions, links, places, np.zeros(1), zero, repetition_weight=0.0, **asked)
     assert free.motion.tolist() == [0, 1, 0, 1]
     assert free.start.tolist() == [0, 1, 2, 3]
-
-
-def test_what_nothing_can_follow_is_taken_out():
-    one, none = (np.array([0]), np.zeros(1)), (np.zeros(0, np.int64), np.zeros(0))
-    places = Places([[one, one], [none, none], [one, none]])
-    kept = decoding.finishing(places)
-    assert [[len(fits) for fits, _ in row] for row in kept.at] == [[0, 1], [0, 0], [1, 0]]
-    with pytest.raises(InfeasibleSpansError) as told:
-        decoding.finishing(Places([[one, one], [none, none], [none, none]]))
-    assert told.value.interval == 2

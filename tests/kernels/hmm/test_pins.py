@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kernels.graph.pins import Pin, find_conflict
-from kernels.hmm.decode import Places
 from kernels.hmm.pins import SpanReach
+from kernels.hmm.places import Places
 
 
 def some_places(seed, n=6, n_motions=5, longest=3):

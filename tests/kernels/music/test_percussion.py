@@ -119,6 +119,19 @@ def test_the_documents_single_symbol_is_the_loudest():
     assert np.argwhere(one).tolist() == [[0, 36 - FIRST_KEY], [1, 49 - FIRST_KEY]]
 
 
+def test_the_single_symbol_is_the_loudest_of_each_interval_alone():
+    rng = np.random.default_rng(5)
+    time_s = np.sort(rng.uniform(-1, 9, 200))
+    hits = Hits(time_s, rng.integers(35, 82, 200), rng.integers(1, 6, 200))
+    edge_s = np.sort(rng.uniform(0, 8, 12))
+    found = loudest_in(hits, edge_s, ahead_s=0.06)
+    for i in range(11):
+        here = (time_s >= edge_s[i] - 0.06) & (time_s < edge_s[i + 1] - 0.06)
+        ranked = sorted(zip((-hits.velocity[here]).tolist(), hits.key_number[here].tolist(), strict=True))
+        assert np.flatnonzero(found[i]).tolist() == [key - FIRST_KEY for _, key in ranked[:1]]
+    assert loudest_in(hits, np.zeros(0)).shape == (0, N_KEYS)
+
+
 def test_a_band_stands_for_all_its_drums():
     counts = np.zeros((1, N_KEYS))
     counts[0, [LOW - FIRST_KEY, HIGH - FIRST_KEY]] = [2, 1]
