@@ -27,15 +27,15 @@ _TRACKED = [
 ]
 N_TRACK = 3 * len(_TRACKED)
 
-COPY_M = 0.08
-"""Mean distance of the joints below which a motion counts as nearer to being a copy than another take of the action."""
+COPY_M = 0.03
+"""Mean distance of the joints below which a motion counts as a copy: copies are within 0.015, other takes rarely here."""
 MOST_FRAMES = 16_000
 """Frames of others, with the room between them, that a query is laid over."""
 _LONGEST_S = 8.0
 _LEAST_SHARE = 0.8
 _LEAST_OF_QUERY = 0.5
 _PACES = tuple(np.exp(np.linspace(-1, 1, 5) * np.log(1.22)).tolist())
-_PACED, _POLISHED = 20, 8
+_PACED, _POLISHED, _POLISHED_M = 20, 8, 0.16
 _STEP = 2
 _EACH = int(QUERY_HZ / TRACK_HZ) * _STEP
 
@@ -124,7 +124,7 @@ def align(query: Track, others: Sequence[Track]) -> list[Alignment]:
     for i, c in enumerate(kept):
         found[c] = min(found[c], (float(paced.distance_m[i]), float(paced.middle_s[i]), float(paced.pace[i])))
     for i in np.argsort(paced.distance_m, kind="stable")[:_POLISHED].tolist():
-        if paced.distance_m[i] < 2 * COPY_M:
+        if paced.distance_m[i] < _POLISHED_M:
             c = kept[i]
             found[c] = min(found[c], _polished(middle, others[c], float(paced.middle_s[i]), float(paced.pace[i])))
     centre_s = (first + (len(middle) - 1) / 2) / QUERY_HZ
