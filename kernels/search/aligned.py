@@ -28,7 +28,7 @@ _TRACKED = [
 N_TRACK = 3 * len(_TRACKED)
 
 COPY_M = 0.03
-"""Mean distance of the joints below which a motion counts as a copy: copies are within 0.015, other takes rarely here."""
+"""Mean distance of the joints below which a motion counts as a copy: copies are within 0.015, other takes rarely."""
 MOST_FRAMES = 16_000
 """Frames of others, with the room between them, that a query is laid over."""
 _LONGEST_S = 8.0
