@@ -19,7 +19,7 @@ from kernels.search.train import Trained, Training
 from kernels.types import Float, Int
 
 LABELLED = {"network": 0.10, "discriminant": 0.88, "principal": 0.02}
-UNLABELLED = {"network": 0.5, "principal": 0.5}
+UNLABELLED = {"network": 0.1, "principal": 0.9}
 _VALIDATION_FOLDS = 6
 _PATIENCE = 3
 _LEAST_OF_A_LABEL = 3
