@@ -130,10 +130,10 @@ def stretch(wish: PinWish, song: Song) -> tuple[int, int]:
         If the place is not in the song, or its bars are not known.
     """
     n = len(song.grid_s) - 1
+    # A first or last interval of which the song has less than half is no moment of its own.
+    seen = np.diff(np.clip(song.grid_s, 0.0, song.duration_s)) >= np.diff(song.grid_s) / 2
+    whole = np.flatnonzero(seen) if seen.any() else np.arange(n)
     if wish.place:
-        # A first or last interval of which the song has less than half is no moment of its own.
-        seen = np.diff(np.clip(song.grid_s, 0.0, song.duration_s)) >= np.diff(song.grid_s) / 2
-        whole = np.flatnonzero(seen) if seen.any() else np.arange(n)
         return (0, int(whole[0]) + 1) if wish.place == "start" else (int(whole[-1]), n)
     if wish.beat:
         return _counted(wish, "beat", wish.beat, wish.until_beat or wish.beat + 1, np.arange(len(song.own)) + 1, song)
@@ -149,7 +149,7 @@ def stretch(wish: PinWish, song: Song) -> tuple[int, int]:
         raise DirectionError(f"{wish.text}: want seconds within the song, 0 to {song.duration_s:.2f}, got {until:g}")
     first = int(np.clip(np.searchsorted(song.grid_s, wish.at + 1e-9, side="right") - 1, 0, n - 1))
     last = int(np.searchsorted(song.grid_s, until - 1e-9, side="left")) if wish.until > 0 else first + 1
-    return first, int(np.clip(last, first + 1, n))
+    return min(first, int(whole[-1])), int(np.clip(max(last, int(whole[0]) + 1), first + 1, n))
 
 
 def _counted(wish: PinWish, unit: str, first: int, end: int, number: NDArray[np.int64], song: Song) -> tuple[int, int]:

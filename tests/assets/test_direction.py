@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assets.direction import DirectionError, Nodes, Song, kept, sentences, to_pin, way_out
+from assets.direction import DirectionError, Nodes, Song, kept, sentences, stretch, to_pin, way_out
 from kernels.graph.pins import Conflict, WayOut
 from kernels.types import BeatGrid
 from schemas.pins import parse_pin
@@ -144,3 +144,14 @@ def test_the_start_and_the_end_are_moments_one_can_see(nodes):
     short = Song(np.arange(10) * 0.5 - 0.4, beats, 3.7)
     end = to_pin(parse_pin("end=spin"), short, nodes)
     assert (end.first, end.last) == (7, 9)
+
+
+def test_a_moment_before_the_first_beat_is_that_of_the_beat():
+    """Three milliseconds before a song's first beat are no moment of their own, nor are those after its last."""
+    time_s = 0.003 + np.arange(8) * 0.5
+    beats = BeatGrid(time_s, np.zeros(8, int), np.zeros(8, int), np.ones(8))
+    song = Song(np.append(time_s[0] - 0.5, np.append(time_s, time_s[-1] + 0.5)), beats, float(time_s[-1]) + 0.004)
+    assert stretch(parse_pin("0=spin"), song) == (0, 2)
+    assert stretch(parse_pin("0.2=spin"), song) == (1, 2)
+    assert stretch(parse_pin("3.505=spin"), song) == (7, 9)
+    assert stretch(parse_pin("0-0.002=spin"), song) == (0, 2)
