@@ -27,6 +27,7 @@ FAR = 8.0
 """Price of a seam to any other motion: dear, but there is always one."""
 
 REPETITION = 0.25
+"""Price of each earlier showing of a motion: a quarter of a choice of recordings', for here it costs likelihood too."""
 WINDOW, LOOK_AHEAD = 16, 12
 """Intervals that are danced at a time, and looked at beyond."""
 
