@@ -137,12 +137,14 @@ class _Reader:
             for table in (POSE, SKELETON)
         }
         calibration = tables.concat(CALIBRATION, _filled(made[CALIBRATION.name]))
+        solver = self._solvers(self._studio.settings().calibration.method) if calibration.num_rows else None
         parts[CALIBRATION.name] = Part(
             session,
             calibration,
             version,
             _stamps(stamps, made[CALIBRATION.name]),
-            {"calibrations": dg.MetadataValue.md(calibration_plots.session(calibration, doubtful))},
+            {"calibrations": dg.MetadataValue.md(calibration_plots.session(calibration, doubtful))}
+            | ({"device": getattr(solver, "name", "reference")} if calibration.num_rows else {}),
         )
         parts[CLIP.name] = Part(
             session,

@@ -84,6 +84,7 @@ def match(
         metadata = {
             "clips": len(clip_ids),
             "segments": len(parts),
+            "device": getattr(matcher, "name", "reference"),
             "clips_left_out": "; ".join(left_out) or "none",
             "matches": dg.MetadataValue.md(matching_plots.segment_matches(segments, stored)),
             "curves": dg.MetadataValue.md(_curves(segments, parts, stored, rhythms)),

@@ -40,7 +40,7 @@ from kernels.calibration.poses import body_model, gaps, solve_poses, to_stream
 from kernels.calibration.records import PARENT
 from kernels.calibration.springs import relax_frame, spring_body
 from kernels.calibration.tree_solver import Stream
-from kernels.opencl.device import pick_device
+from kernels.opencl.choice import pick_device
 from kernels.opencl.tree_gauss_newton import TreeGaussNewton
 from kernels.synthetic import suit
 

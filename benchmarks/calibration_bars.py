@@ -20,7 +20,7 @@ from kernels.calibration.pairs import pair_costs, spanning_tree
 from kernels.calibration.poses import body_model, solve_poses, to_stream
 from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, Finding, Recording
 from kernels.calibration.tree_solver import solve_tree
-from kernels.opencl.device import pick_device
+from kernels.opencl.choice import pick_device
 from kernels.opencl.spring_relaxation import SpringRelaxation
 from kernels.opencl.tree_gauss_newton import TreeGaussNewton
 from kernels.synthetic import suit

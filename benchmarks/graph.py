@@ -36,7 +36,7 @@ from kernels.graph.features import BeatFeatures, beat_features, concatenate_beat
 from kernels.graph.nodes import BeatNodes, beat_nodes
 from kernels.graph.path import find_path
 from kernels.graph.transitions import N_NEAREST, connect, nearest
-from kernels.opencl.device import pick_device
+from kernels.opencl.choice import pick_device
 from kernels.opencl.pose_distance import PoseDistance
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.kinematics import forward

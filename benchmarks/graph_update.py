@@ -27,7 +27,7 @@ from kernels.graph.features import BeatFeatures, beat_features, concatenate_beat
 from kernels.graph.nodes import BeatNodes, beat_nodes
 from kernels.graph.shortlist import Shortlist, Work, make_shortlist, nearest_of, update_shortlist
 from kernels.graph.transitions import Transitions, connect
-from kernels.opencl.device import pick_device
+from kernels.opencl.choice import pick_device
 from kernels.opencl.pose_distance import PoseDistance
 from kernels.types import Float
 

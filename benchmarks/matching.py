@@ -39,7 +39,7 @@ from assets.formats import bvh
 from kernels.matching.blocks import rows
 from kernels.matching.plan import BRUTE, BRUTE_SPARSE, Plan, built, bytes_a_frame
 from kernels.matching.score import SCALE_NUMERATORS, reference_matches, start_count
-from kernels.opencl.device import pick_device
+from kernels.opencl.choice import pick_device
 from kernels.opencl.match import ClipIndex, Matcher
 from kernels.opencl.match_program import Program
 from kernels.opencl.match_tables import Tables

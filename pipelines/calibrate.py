@@ -7,7 +7,7 @@ import io
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,11 +18,12 @@ from assets.formats import bvh
 from assets.formats.errors import FormatError
 from assets.formats.settings import read_settings
 from assets.scan import POSES_ENDING
-from kernels.calibration.records import JOINTS, PARENT, Calibration
-from kernels.calibration.tree_solver import PoseSolver
+from kernels.calibration.records import JOINTS, Calibration
+from pipelines.devices import Devices
 from pipelines.files import write_beside
 from pipelines.outcome import DONE, NOTHING_DONE, Outcome
-from schemas.settings import OpenClSettings, Settings
+from pipelines.twins import PoseSolvers
+from schemas.settings import Settings
 
 
 def calibrate(
@@ -64,7 +65,7 @@ def calibrate(
             recording,
             settings=chosen.calibration,
             sensors=settings.sensors,
-            solvers=PoseSolvers(settings.opencl),
+            solvers=PoseSolvers(Devices(settings.opencl.device)),
             max_bytes=int(settings.limits.largest_clip_mb * 1e6),
         )
     except CalibrationError as error:
@@ -185,38 +186,3 @@ def _joint_lines(calibration: Calibration) -> list[str]:
         line = f"  {joint.joint:<12} {joint.parent:<12} {length_mm:8.1f}  {residual_mm:12.1f}  {joint.confidence}"
         lines.append(f"{line}: {joint.advice}" if joint.advice else line)
     return lines
-
-
-class PoseSolvers:
-    """What poses of suits are solved on, by method, built when first asked for; OpenCL is loaded then.
-
-    Parameters
-    ----------
-    settings : the ``[opencl]`` section
-    """
-
-    def __init__(self, settings: OpenClSettings) -> None:
-        self._settings = settings
-        self._made: dict[str, PoseSolver] = {}
-
-    def __call__(self, method: str) -> PoseSolver:
-        """Solver of a method on the device."""
-        if method not in self._made:
-            self._made[method] = self._make(method)
-        return self._made[method]
-
-    def _make(self, method: str) -> PoseSolver:
-        import pyopencl as cl
-
-        from kernels.opencl.device import pick_device
-
-        device = pick_device(self._settings.device)
-        context = cl.Context([device])
-        precision: Literal["single", "double"] = "double" if device.double_fp_config else "single"
-        if method == "springs":
-            from kernels.opencl.spring_relaxation import SpringRelaxation
-
-            return SpringRelaxation(context, parent=PARENT, precision=precision)
-        from kernels.opencl.tree_gauss_newton import TreeGaussNewton
-
-        return TreeGaussNewton(context, parent=PARENT, precision=precision)

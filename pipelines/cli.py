@@ -14,7 +14,9 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-# Nothing of ours is imported here: --help answers at once, and main sets the environment before NumPy is loaded.
+from pipelines.caches import settle
+
+# Nothing else of ours is imported here: --help answers at once, and main sets the environment before NumPy is loaded.
 app = typer.Typer(
     add_completion=False,
     no_args_is_help=True,
@@ -277,15 +279,21 @@ def calibrate(
 
 
 @app.command()
-def status(studio: StudioOption = None, as_json: JsonOption = False) -> None:
+def status(
+    studio: StudioOption = None,
+    devices: Annotated[
+        bool, typer.Option("--devices", help="Also try every OpenCL device anew, and say which is used and why.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
     """Say what is fresh, stale, failed or refused, and why.
 
-    Examples: odori status · odori status --json
+    Examples: odori status · odori status --json · odori status --devices (needs no studio)
     """
     from pipelines.status import status as say_status
 
     with _Trouble(as_json):
-        _finish(say_status(_folder(studio)), as_json)
+        _finish(say_status(_folder(studio), devices=devices), as_json)
 
 
 @app.command()
@@ -359,6 +367,7 @@ def main() -> None:
     """Run the command; ``--json`` may stand anywhere, also last."""
     for library in ("OPENBLAS", "OMP", "MKL"):  # more threads change last bits: same inputs, same bytes
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    settle()
     try:
         app()
     except SystemExit as ended:

@@ -18,6 +18,7 @@ from pipelines import casting, dancing, proposing
 from pipelines import why as explaining
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
+from pipelines.devices import DeviceError, Devices, to_standard_error
 from pipelines.files import LakeError, StudioError
 from pipelines.freshness import Freshness
 from pipelines.outcome import DONE, NOTHING_DONE, SOME_REFUSED, Outcome
@@ -33,7 +34,10 @@ class Session:
 
     def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
         self.studio = studio
-        check_settings(studio)
+        self.notes: list[str] = []
+        """What the person who waits was told: which device failed, what is slow and why."""
+        self.devices = Devices(studio.settings().opencl.device, say=self._say)
+        check_settings(studio, self.devices)
         self.state = freshness(studio)
         self._progress = progress
 
@@ -50,7 +54,7 @@ class Session:
             with building.exclusive(self.studio):
                 instance = building.open_instance(self.studio)
                 building.clear_after_kill(self.studio, instance)
-                definitions = build_definitions(self.studio, progress=bar)
+                definitions = build_definitions(self.studio, progress=bar, devices=self.devices)
                 return building.bring_up_to_date(
                     self.studio, definitions, instance, self.state, groups=groups, keys=keys, assets=assets
                 )
@@ -63,8 +67,12 @@ class Session:
             if hasattr(bar, "close"):
                 bar.close()
 
+    def _say(self, line: str) -> None:
+        self.notes.append(line)
+        to_standard_error(line)
 
-def check_settings(studio: StudioFolder) -> None:
+
+def check_settings(studio: StudioFolder, devices: Devices) -> None:
     """Refuse settings before anything runs; FormatError naming the key."""
     settings = studio.settings()
     try:
@@ -77,12 +85,10 @@ def check_settings(studio: StudioFolder) -> None:
             hint = f"did you mean {near[0]!r}?" if near else f"they are {', '.join(JOINTS)}"
             raise FormatError("odori.toml", 0, f"[joints] {source!r}: want a canonical joint, got {joint!r}; {hint}")
     if settings.opencl.device:
-        from kernels.opencl.device import NoDeviceError, pick_device
-
         try:
-            pick_device(settings.opencl.device)
-        except NoDeviceError as error:
-            raise FormatError("odori.toml", 0, f"[opencl] {error}") from error
+            devices.in_use()
+        except DeviceError as error:
+            raise FormatError("odori.toml", 0, str(error.args[0])) from error
 
 
 def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
@@ -102,7 +108,7 @@ def build(root: Path, *, dances: bool, progress: Callable[[], Any]) -> Outcome:
         "refused": [{"path": f["path"], "reason": f["reason"]} for f in refused],
         "ran": [{"assets": list(b.assets), "partitions": list(b.keys)} for b in report.ran],
         "failed": report.failed,
-        "notes": list(sources.notes),
+        "notes": [*sources.notes, *work.notes],
     }
     troubles = [*refusals(refused), *(f"failed: {f}" for f in report.failed), *(f"note: {n}" for n in sources.notes)]
     status = (
@@ -189,7 +195,7 @@ def dance(
     troubles += [f"failed: {f}" for f in report.failed if not f.startswith(told)]
     troubles = list(dict.fromkeys(troubles))
     status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
-    facts = dancing.dances_facts(made, troubles, len(keys))
+    facts = dancing.dances_facts(made, troubles, len(keys)) | {"notes": work.notes}
     if not made:
         facts |= next((dict(t.facts) for t in report.troubles if "conflict" in t.facts), {})
     return Outcome(status, facts, "\n".join(dancing.report_of(d) for d in made), troubles)

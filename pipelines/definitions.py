@@ -5,10 +5,12 @@ from typing import Any
 import dagster as dg
 
 from pipelines import jobs, schedules, sensors
-from pipelines.calibrate import PoseSolvers
+from pipelines.caches import settle
 from pipelines.collection import ASSETS, freshness
+from pipelines.devices import Devices
 from pipelines.io_managers import EarlierTables, IndexIOManager, LakeIOManager, StageIOManager
-from pipelines.resources import GraphMemory, NoProgress, StudioFolder, matcher, pair_distance, studio_from_environment
+from pipelines.resources import GraphMemory, NoProgress, StudioFolder, studio_from_environment
+from pipelines.twins import Distances, Matches, PoseSolvers
 
 
 def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> dg.Definitions:  # noqa: ANN401 - resources are of any type
@@ -19,21 +21,28 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
     studio : StudioFolder, or None for the one named by the environment
     overrides : resources by key, in place of the usual ones
     """
+    settle()
     folder = studio or studio_from_environment()
+    devices: dict[str, Devices] = {}
     # Made for each run anew: a run keeps to the settings and sources it began with, and its stamps say so.
     resources: dict[str, Any] = {
         "studio": dg.ResourceDefinition(lambda _: folder.frozen()),
         "earlier": EarlierTables(folder.lake),
         "progress": NoProgress(),
+        "devices": dg.ResourceDefinition(
+            lambda context: _devices(devices, context.resources.studio.settings().opencl.device),
+            required_resource_keys={"studio"},
+        ),
         "pair_distance": dg.ResourceDefinition(
-            lambda context: pair_distance(context.resources.studio.settings().opencl), required_resource_keys={"studio"}
+            lambda context: Distances(context.resources.devices), required_resource_keys={"devices"}
         ),
         "graph_memory": GraphMemory(folder.lake),
         "matcher": dg.ResourceDefinition(
-            lambda context: matcher(context.resources.studio.settings()), required_resource_keys={"studio"}
+            lambda context: Matches(context.resources.devices, context.resources.studio.settings().matching),
+            required_resource_keys={"devices", "studio"},
         ),
         "solvers": dg.ResourceDefinition(
-            lambda context: PoseSolvers(context.resources.studio.settings().opencl), required_resource_keys={"studio"}
+            lambda context: PoseSolvers(context.resources.devices), required_resource_keys={"devices"}
         ),
         "lake": dg.IOManagerDefinition(
             lambda context: LakeIOManager(context.resources.studio.lake, freshness(context.resources.studio)),
@@ -56,6 +65,13 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         resources=resources | overrides,
         executor=dg.in_process_executor,
     )
+
+
+def _devices(known: dict[str, Devices], wanted: str) -> Devices:
+    """Give the devices by what is wanted: what failed in one run of this process is not taken again in the next."""
+    if wanted not in known:
+        known[wanted] = Devices(wanted)
+    return known[wanted]
 
 
 defs = build_definitions()

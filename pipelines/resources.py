@@ -1,4 +1,4 @@
-"""Resources that build plain objects: the studio, the lake, the OpenCL device, progress.
+"""Resources that are plain objects: the studio, the lake, what the graph remembers, progress.
 
 The only place that reads the environment.
 """
@@ -19,12 +19,10 @@ from upath import UPath
 from assets import scan, sources
 from assets.formats.settings import read_settings
 from assets.formats.tree import HashCache
-from assets.matching import SegmentMatcher
 from assets.sources import Request, Song, Sources
-from kernels.graph.distance import PairDistance
 from pipelines.files import write_beside
 from pipelines.lake import Lake
-from schemas.settings import Brief, OpenClSettings, Settings
+from schemas.settings import Brief, Settings
 
 
 class StudioFolder:
@@ -144,27 +142,6 @@ class NoProgress:
 
     def step(self) -> None:
         """One more is done."""
-
-
-def matcher(settings: Settings) -> SegmentMatcher:
-    """Build the search for matches on the device the settings name; OpenCL is loaded here, not with the module."""
-    import pyopencl as cl
-
-    from kernels.matching.search import Matcher
-    from kernels.opencl.device import pick_device
-
-    device = pick_device(settings.opencl.device)
-    return Matcher(cl.Context([device]), memory_bytes=int(settings.matching.memory_mb * 2**20))
-
-
-def pair_distance(settings: OpenClSettings) -> PairDistance:
-    """Build the pose distance on the device the settings name; OpenCL is loaded here, not with the module."""
-    import pyopencl as cl
-
-    from kernels.opencl.device import pick_device
-    from kernels.opencl.pose_distance import PoseDistance
-
-    return PoseDistance(cl.Context([pick_device(settings.device)]))
 
 
 class GraphMemory:

@@ -6,6 +6,7 @@ from typing import Any
 
 from assets.lineage import content_version
 from pipelines import build as building
+from pipelines import device_report
 from pipelines.collection import freshness
 from pipelines.freshness import Finding, Freshness
 from pipelines.outcome import DONE, SOME_REFUSED, Outcome
@@ -17,8 +18,19 @@ from schemas.music import SONG
 LONGEST_LIST = 40
 
 
-def status(root: Path) -> Outcome:
-    """Say what is fresh, stale, failed or refused."""
+def status(root: Path, *, devices: bool = False) -> Outcome:
+    """Say what is fresh, stale, failed or refused; of the devices too, for which no studio is needed."""
+    if devices:
+        of_devices = device_report.report(root)
+        if not root.is_dir():
+            return of_devices
+        found = status(root)
+        return Outcome(
+            max(found.status, of_devices.status),
+            found.facts | of_devices.facts,
+            f"{found.report}\n{of_devices.report}",
+            [*found.troubles, *of_devices.troubles],
+        )
     studio = existing(root)
     state = freshness(studio)
     (clips, doubts), songs = _clips_and_doubts(state, studio), songs_of(state, studio)

@@ -1,4 +1,4 @@
-"""Which OpenCL devices there are, picking one of them, and building kernels for it."""
+"""Which OpenCL devices there are, and building kernels for one."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from typing import Literal
 import numpy as np
 import pyopencl as cl
 
-
-class NoDeviceError(LookupError):
-    """There is no OpenCL device, or none as wanted; the message lists what is there."""
+from kernels.opencl.pocl_target import RELEASE, name_target
 
 
 @dataclass(frozen=True)
@@ -25,6 +23,8 @@ class DeviceInfo:
     name, platform, driver : str, as the driver says
     kind : "GPU", "CPU" or "other"
     memory_bytes : int, global memory
+    is_bundled : bool
+        Whether the driver came with the Python packages: a frozen release, slower than what a system brings.
     """
 
     index: int
@@ -33,6 +33,7 @@ class DeviceInfo:
     driver: str
     kind: str
     memory_bytes: int
+    is_bundled: bool = False
 
     def __str__(self) -> str:
         return f"{self.index}: {self.name} ({self.kind}, {self.platform})"
@@ -54,11 +55,12 @@ def full_name(device: cl.Device) -> str:
 
 
 def list_devices() -> list[cl.Device]:
-    """Find every OpenCL device, platforms in the loader's order.
+    """Find every OpenCL device, platforms in the loader's order; none is tried.
 
     Returns
     -------
     list of cl.Device; empty where no driver is installed
+        Those of PoCL 3.0-rc2 have a processor's name that their compiler knows.
     """
     try:
         platforms = cl.get_platforms()
@@ -70,59 +72,37 @@ def list_devices() -> list[cl.Device]:
             devices += platform.get_devices()
         except cl.Error:  # a platform without a device says so by an error
             continue
+    for device in devices:
+        name_target(device)
     return devices
+
+
+def describe(device: cl.Device, index: int) -> DeviceInfo:
+    """Describe one device.
+
+    Parameters
+    ----------
+    device : cl.Device
+    index : int, its place among :func:`list_devices`
+
+    Returns
+    -------
+    DeviceInfo
+    """
+    return DeviceInfo(
+        index=index,
+        name=device.name.strip(),
+        platform=device.platform.name.strip(),
+        driver=device.driver_version.strip(),
+        kind=_kind(device),
+        memory_bytes=int(device.global_mem_size),
+        is_bundled=device.platform.version.strip() == RELEASE,
+    )
 
 
 def describe_devices() -> list[DeviceInfo]:
     """Describe every device, in the order of :func:`list_devices`; empty where no driver is installed."""
-    return [
-        DeviceInfo(
-            index=index,
-            name=device.name.strip(),
-            platform=device.platform.name.strip(),
-            driver=device.driver_version.strip(),
-            kind=_kind(device),
-            memory_bytes=int(device.global_mem_size),
-        )
-        for index, device in enumerate(list_devices())
-    ]
-
-
-def pick_device(wanted: str | int | None = None) -> cl.Device:
-    """Pick a device by index, by name, or by rule.
-
-    Parameters
-    ----------
-    wanted : int, str or None
-        An index of :func:`list_devices` (also as a string of digits); or a part of a device's or its platform's name,
-        upper and lower case alike, first match; or None: the first GPU, else the first CPU, else the first of all.
-
-    Returns
-    -------
-    cl.Device
-
-    Raises
-    ------
-    NoDeviceError
-        If there is no device at all, or none is as wanted; the message lists what is there. Never another device.
-    """
-    devices = list_devices()
-    if not devices:
-        raise NoDeviceError(
-            "device: want an OpenCL device, found none; install a driver (pocl-binary-distribution brings one "
-            "for the CPU) or choose the reference backend"
-        )
-    if wanted is None or wanted == "":
-        return min(devices, key=lambda device: ("GPU", "CPU", "other").index(_kind(device)))
-    if isinstance(wanted, int) or wanted.isdecimal():
-        if 0 <= int(wanted) < len(devices):
-            return devices[int(wanted)]
-    else:
-        for device in devices:
-            if wanted.casefold() in f"{device.name} {device.platform.name}".casefold():
-                return device
-    there = "; ".join(str(info) for info in describe_devices())
-    raise NoDeviceError(f"device: want {wanted!r}, found only {there}; name one of these by index or part of its name")
+    return [describe(device, index) for index, device in enumerate(list_devices())]
 
 
 def only_device(context: cl.Context) -> cl.Device:

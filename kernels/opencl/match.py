@@ -24,7 +24,7 @@ from kernels.matching.score import (
     start_count,
     sums_of_candidates,
 )
-from kernels.opencl.device import pick_device
+from kernels.opencl.choice import pick_device
 from kernels.opencl.match_finalists import candidates, finalists
 from kernels.opencl.match_program import Program
 from kernels.opencl.match_stages import Stages, wants_safe
@@ -99,7 +99,7 @@ class Matcher:
 
     Parameters
     ----------
-    context : cl.Context of one device, or None for the device :func:`kernels.opencl.device.pick_device` picks
+    context : cl.Context of one device, or None for the device :func:`kernels.opencl.choice.pick_device` picks
     memory_bytes : int
         Device memory for clips and their tables; more clips are taken chunk by chunk.
     plan : Plan or None
@@ -111,7 +111,7 @@ class Matcher:
 
     Raises
     ------
-    kernels.opencl.device.NoDeviceError
+    kernels.opencl.choice.NoDeviceError
         If no device is given and there is none.
     ValueError
         If the memory is not > 0, or the context has not exactly one device.

@@ -21,7 +21,7 @@ class PoseDistance:
     Parameters
     ----------
     context : cl.Context of one device
-        From :func:`kernels.opencl.device.pick_device`; nothing is chosen here.
+        From :func:`kernels.opencl.choice.pick_device`; nothing is chosen here.
 
     Raises
     ------

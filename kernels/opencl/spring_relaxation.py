@@ -21,7 +21,7 @@ class SpringRelaxation:
     Parameters
     ----------
     context : cl.Context of one device
-        From :func:`kernels.opencl.device.pick_device`; nothing is chosen here.
+        From :func:`kernels.opencl.choice.pick_device`; nothing is chosen here.
     parent : indices of the bones' parents, the root's -1
     precision : "single" or "double"
     is_serial : bool

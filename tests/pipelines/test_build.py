@@ -12,7 +12,7 @@ import dagster as dg
 import pyarrow.parquet as pq
 import pytest
 
-from kernels.opencl.device import pick_device
+from kernels.opencl.choice import pick_device
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.files import StudioError

@@ -1,0 +1,154 @@
+"""What the stages compute on, each on the device in use: matches, pose distances, poses of suits.
+
+Every one has a twin in NumPy, the reference, for machines without a device.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from numpy.typing import NDArray
+
+from assets.matching import SegmentMatcher
+from kernels.calibration.records import PARENT
+from kernels.calibration.springs import relax_springs
+from kernels.calibration.tree_solver import BodyModel, PoseSolver, Solved, Stream, solve_tree
+from kernels.graph.distance import PairDistance, PoseFeatures, pose_distance
+from kernels.matching.score import Match
+from pipelines.devices import Devices, OnDevice
+from schemas.settings import MatchingSettings
+
+
+class Distances:
+    """Pose distances on the device in use; see :class:`kernels.graph.distance.PairDistance`.
+
+    Parameters
+    ----------
+    devices : Devices
+    """
+
+    def __init__(self, devices: Devices) -> None:
+        self._on: OnDevice[PairDistance] = OnDevice(devices, _distance)
+
+    @property
+    def name(self) -> str:
+        """What computes, with its driver."""
+        return self._on.name
+
+    def __call__(self, rows: PoseFeatures, columns: PoseFeatures) -> NDArray[Any]:
+        """Distances of every row to every column, as the protocol has it."""
+        return self._on.use(lambda distance: distance(rows, columns))
+
+
+class Matches:
+    """The search for matches on the device in use; see :class:`assets.matching.SegmentMatcher`.
+
+    Parameters
+    ----------
+    devices : Devices
+    settings : the ``[matching]`` section
+    """
+
+    def __init__(self, devices: Devices, settings: MatchingSettings) -> None:
+        memory_bytes = int(settings.memory_mb * 2**20)
+        self._on: OnDevice[SegmentMatcher] = OnDevice(devices, lambda context: _matcher(context, memory_bytes))
+
+    @property
+    def name(self) -> str:
+        """What computes, with its driver."""
+        return self._on.name
+
+    def index(self, clips: Sequence[NDArray[Any]]) -> "Catalogue":
+        """Prepare a catalogue for many songs."""
+        return Catalogue(clips)
+
+    def matches(
+        self, segments: Sequence[NDArray[Any]], clips: "Catalogue | Sequence[NDArray[Any]]", *, k: int
+    ) -> Sequence[Sequence[Match]]:
+        """Find the k best clips of every segment."""
+        if not isinstance(clips, Catalogue):
+            return self._on.use(lambda engine: engine.matches(segments, clips, k=k))
+        return self._on.use(lambda engine: engine.matches(segments, clips.indexed(engine), k=k))
+
+
+class Catalogue:
+    """Clips prepared for many songs on whatever searches them.
+
+    Parameters
+    ----------
+    clips : sequence of (T,) float, finite, >= 0, in ascending order of their keys
+    """
+
+    def __init__(self, clips: Sequence[NDArray[Any]]) -> None:
+        self._clips = clips
+        self._made: tuple[SegmentMatcher, Any] | None = None
+
+    def indexed(self, engine: SegmentMatcher) -> Any:  # noqa: ANN401 - what only the engine reads
+        """Give the index of one engine, made anew where another made the last."""
+        if self._made is None or self._made[0] is not engine:
+            self._made = engine, engine.index(self._clips)
+        return self._made[1]
+
+
+class PoseSolvers:
+    """What poses of suits are solved on, by method, built when first asked for; OpenCL is loaded then.
+
+    Parameters
+    ----------
+    devices : Devices
+    """
+
+    def __init__(self, devices: Devices) -> None:
+        self._devices = devices
+        self._made: dict[str, _Solver] = {}
+
+    def __call__(self, method: str) -> PoseSolver:
+        """Solver of a method on the device in use."""
+        if method not in self._made:
+            self._made[method] = _Solver(self._devices, method)
+        return self._made[method]
+
+
+class _Solver:
+    """Poses of a suit by one method on the device in use; see :class:`kernels.calibration.tree_solver.PoseSolver`."""
+
+    def __init__(self, devices: Devices, method: str) -> None:
+        self._on: OnDevice[PoseSolver] = OnDevice(devices, lambda context: _solver(context, method))
+
+    @property
+    def name(self) -> str:
+        return self._on.name
+
+    def __call__(self, model: BodyModel, stream: Stream, *, iterations: int) -> Solved:
+        return self._on.use(lambda solver: solver(model, stream, iterations=iterations))
+
+
+def _distance(context: Any) -> PairDistance:  # noqa: ANN401 - a cl.Context or None
+    if context is None:
+        return pose_distance
+    from kernels.opencl.pose_distance import PoseDistance
+
+    return PoseDistance(context)
+
+
+def _matcher(context: Any, memory_bytes: int) -> SegmentMatcher:  # noqa: ANN401 - a cl.Context or None
+    if context is None:
+        from kernels.matching.numpy_search import NumpyMatcher
+
+        return NumpyMatcher(memory_bytes=memory_bytes)
+    from kernels.opencl.match import Matcher
+
+    return Matcher(context, memory_bytes=memory_bytes)
+
+
+def _solver(context: Any, method: str) -> PoseSolver:  # noqa: ANN401 - a cl.Context or None
+    if context is None:
+        return relax_springs if method == "springs" else solve_tree
+    device = context.devices[0]
+    precision: Literal["single", "double"] = "double" if device.double_fp_config else "single"
+    if method == "springs":
+        from kernels.opencl.spring_relaxation import SpringRelaxation
+
+        return SpringRelaxation(context, parent=PARENT, precision=precision)
+    from kernels.opencl.tree_gauss_newton import TreeGaussNewton
+
+    return TreeGaussNewton(context, parent=PARENT, precision=precision)
