@@ -100,7 +100,7 @@ def _temporary_folders() -> Iterable[Path]:
     with suppress(OSError):  # no folder for temporary files at all
         yield Path(tempfile.gettempdir())
     if sys.platform != "win32":
-        yield from map(Path, ("/tmp", "/var/tmp", "/dev/shm"))  # noqa: S108 - checked to be our own
+        yield from map(Path, ("/tmp", "/var/tmp", "/dev/shm"))  # checked to be our own
 
 
 def _is_own(folder: Path, owner: int) -> bool:

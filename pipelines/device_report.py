@@ -1,4 +1,4 @@
-"""What ``odori status --devices`` says: every device after its trial, which one computes, and what would make it fast."""
+"""What ``odori status --devices`` says: every device after its trial, which one computes, and why."""
 
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,7 @@
 """Which OpenCL device the stages run on: every one is tried first, and one that fails gives way to the next.
 
-After the last comes the NumPy reference, which every machine has. A trial runs in a process of its own and is remembered
-by driver and processor, so it costs nothing in daily use.
+After the last comes the NumPy reference, which every machine has. A trial runs in a process of its own and is
+remembered by driver and processor, so it costs nothing in daily use.
 """
 
 import hashlib
@@ -70,13 +70,21 @@ class Memory:
     def recall(self, key: str) -> str | None:
         """Give the reason remembered of a device, empty where it passed; None where nothing is known."""
         held = self._held().get(key)
-        is_known = isinstance(held, dict) and isinstance(held.get("reason"), str)
-        if not is_known or (held["reason"] and not 0 <= time.time() - _number(held.get("at_s")) < FORGET_S):
+        reason = held.get("reason") if isinstance(held, dict) else None
+        if held is None or not isinstance(reason, str):
             return None
-        return str(held["reason"])
+        is_old = not 0 <= time.time() - _number(held.get("at_s")) < FORGET_S
+        return None if reason and is_old else reason
 
     def keep(self, key: str, name: str, reason: str) -> None:
-        """Remember what a trial came to."""
+        """Remember what a trial came to.
+
+        Parameters
+        ----------
+        key : str, what names device, driver and processor
+        name : str, for a person who looks into the file
+        reason : why it cannot be used; empty where it can
+        """
         if self._path is None:
             return
         held = self._held() | {key: {"name": name, "reason": reason, "at_s": time.time()}}
@@ -180,7 +188,12 @@ class Devices:
         return known
 
     def describe(self, index: int, *, anew: bool = False) -> Tried:
-        """Describe a device and what its trial came to; arguments as :meth:`fault`."""
+        """Describe a device and what its trial came to.
+
+        Parameters
+        ----------
+        index, anew : as :meth:`fault` has them
+        """
         from kernels.opencl.device import describe
 
         info = describe(self._found[index], index)
@@ -188,7 +201,12 @@ class Devices:
         return Tried(index, info.name, driver, info.kind, info.platform, self.fault(index, anew=anew))
 
     def all(self, *, anew: bool = True) -> list[Tried]:
-        """Describe every device in the order in which they are taken, the reference last; arguments as :meth:`fault`."""
+        """Describe every device in the order in which they are taken, the reference last.
+
+        Parameters
+        ----------
+        anew : whether each is tried whatever is remembered
+        """
         import numpy as np
 
         there = [self.describe(index, anew=anew) for index in self._order()]
@@ -196,6 +214,11 @@ class Devices:
 
     def give_up(self, device: Any, error: Exception) -> None:  # noqa: ANN401 - a cl.Device
         """Take a device out of use that failed in the middle of its work, and say so.
+
+        Parameters
+        ----------
+        device : cl.Device, the one in use
+        error : what it failed with
 
         Raises
         ------

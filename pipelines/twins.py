@@ -35,7 +35,16 @@ class Distances:
         return self._on.name
 
     def __call__(self, rows: PoseFeatures, columns: PoseFeatures) -> NDArray[Any]:
-        """Distances of every row to every column, as the protocol has it."""
+        """Distances of every row to every column.
+
+        Parameters
+        ----------
+        rows, columns : PoseFeatures of n and m poses, made alike
+
+        Returns
+        -------
+        (n, m) float, >= 0
+        """
         return self._on.use(lambda distance: distance(rows, columns))
 
 
@@ -58,13 +67,29 @@ class Matches:
         return self._on.name
 
     def index(self, clips: Sequence[NDArray[Any]]) -> "Catalogue":
-        """Prepare a catalogue for many songs."""
+        """Prepare a catalogue for many songs.
+
+        Parameters
+        ----------
+        clips : sequence of (T,) float, finite, >= 0, in ascending order of their keys
+        """
         return Catalogue(clips)
 
     def matches(
         self, segments: Sequence[NDArray[Any]], clips: "Catalogue | Sequence[NDArray[Any]]", *, k: int
     ) -> Sequence[Sequence[Match]]:
-        """Find the k best clips of every segment."""
+        """Find the k best clips of every segment.
+
+        Parameters
+        ----------
+        segments : sequence of (L,) float, L >= 1, finite, >= 0
+        clips : what :meth:`index` made, or clips
+        k : int, >= 1
+
+        Returns
+        -------
+        one list a segment, the best first
+        """
         if not isinstance(clips, Catalogue):
             return self._on.use(lambda engine: engine.matches(segments, clips, k=k))
         return self._on.use(lambda engine: engine.matches(segments, clips.indexed(engine), k=k))
@@ -83,7 +108,12 @@ class Catalogue:
         self._made: tuple[SegmentMatcher, Any] | None = None
 
     def indexed(self, engine: SegmentMatcher) -> Any:  # noqa: ANN401 - what only the engine reads
-        """Give the index of one engine, made anew where another made the last."""
+        """Give the index of one engine, made anew where another made the last.
+
+        Parameters
+        ----------
+        engine : SegmentMatcher
+        """
         if self._made is None or self._made[0] is not engine:
             self._made = engine, engine.index(self._clips)
         return self._made[1]

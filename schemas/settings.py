@@ -241,7 +241,10 @@ class DanceSettings(_Checked):
 class OpenClSettings(_Checked):
     """Where the heavy arithmetic runs."""
 
-    device: str = key("", "Name or index of a device; empty: the first GPU, else the CPU.")
+    device: str = key(
+        "",
+        "Name or index of a device, or 'reference' for NumPy; empty: the first that works of GPUs, CPU drivers, NumPy.",
+    )
 
 
 @dataclass(frozen=True)

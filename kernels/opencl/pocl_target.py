@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import struct
 from collections.abc import Collection
+from itertools import pairwise
 from typing import BinaryIO
 
 import pyopencl as cl
@@ -98,7 +99,7 @@ def find_name(memory: BinaryIO, record: int) -> int:
     """
     held = _read(memory, record, _RECORD_BYTES)
     pointers = [p for (p,) in struct.iter_unpack("P", held[: len(held) // _POINTER_BYTES * _POINTER_BYTES])]
-    for index, (triplet, name) in enumerate(zip(pointers, pointers[1:], strict=False)):
+    for index, (triplet, name) in enumerate(pairwise(pointers)):
         if _is(memory, triplet, TRIPLET) and _is(memory, name, UNKNOWN):
             return record + (index + 1) * _POINTER_BYTES
     return 0

@@ -2,7 +2,8 @@
 
     python -m kernels.opencl.trial INDEX
 
-tries one device in a process of its own, where a driver that crashes or hangs harms nothing, and prints one JSON object.
+tries one device in a process of its own, where a driver that crashes or hangs harms nothing, and prints one JSON
+object.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ VERSION = "1"
 """Raised by hand when the trial asks for more: what was remembered of it counts no longer."""
 
 _N = 1024
-# Of every answer: sums of a few roundings (mad and division of 2.5 ulp are allowed); the fused product is exact but for one.
+# Each answer is a few roundings off at most: mad and a division to 2.5 ulp are allowed, and the fused product has one.
 _RTOL = 32 * 2.0**-24
 
 Floats = NDArray[np.float32]
@@ -31,10 +32,10 @@ def inputs() -> tuple[Floats, Floats, Floats]:
 
     Returns
     -------
-    a, b : (1024,) float32, in (0, 1], no two alike
+    a, b : (1024,) float32, in (0, 1), no two alike
     weight : (4,) float32, summing to 1
     """
-    a = (np.arange(1, _N + 1, dtype=np.float32) * np.float32(0.37)) % np.float32(1.0) + np.float32(2.0**-12)
+    a = (np.arange(1, _N + 1) * 0.6180339887498949 % 1.0).astype(np.float32)
     return a, np.ascontiguousarray(a[::-1]), np.array([0.5, 0.25, 0.125, 0.125], np.float32)
 
 
@@ -106,9 +107,7 @@ def _run(device: cl.Device) -> tuple[NDArray[np.float64], ...]:
     given = [cl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array) for array in (a, b, weight)]
     real = [np.zeros(_N, np.float32) for _ in range(3)]
     whole = [np.zeros(1, np.int32) for _ in range(2)]
-    answers = [
-        cl.Buffer(context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=array) for array in (*real, *whole)
-    ]
+    answers = [cl.Buffer(context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=array) for array in (*real, *whole)]
     kernel.set_args(np.int32(_N), *given, *answers)
     cl.enqueue_nd_range_kernel(queue, kernel, (_N // 4,), None)
     for array, answer in zip((*real, *whole), answers, strict=True):
