@@ -62,6 +62,15 @@ def test_silence_is_nothing():
 
 
 def test_windows_are_even_and_hold_the_largest():
-    assert [window(value) for value in (1e-9, 0.2, 0.99, 1.0, 3.9, 4.0, 1e-300, 1e300)] == [-28, -2, 0, 2, 2, 4, -60, 20]
+    assert [window(value) for value in (1e-9, 0.2, 0.99, 1.0, 3.9, 4.0, 1e-300, 1e300)] == [
+        -28,
+        -2,
+        0,
+        2,
+        2,
+        4,
+        -60,
+        20,
+    ]
     for value in 2.0 ** np.random.default_rng(2).uniform(-50, 19, 200):
         assert value < 2.0 ** window(value) <= 4 * value
