@@ -17,7 +17,7 @@ from threadpoolctl import threadpool_limits
 from kernels.matching.blocks import rows
 from kernels.matching.bounds import SumTables
 from kernels.matching.catalogue import Catalogue, Chunk, Series, Song, check_search, portions
-from kernels.matching.refinement import PLACE_BITS, Refinement
+from kernels.matching.refinement import PAIRS, PLACE_BITS, STAGES, Refinement
 from kernels.matching.score import SCALES, Match, merge_matches, numerators, ratios, sums_of_candidates
 
 MEMORY_BYTES = 2**31
@@ -132,10 +132,9 @@ class NumpyMatcher:
         self, clips: Iterable[Series], fiftieths: tuple[int, ...], *, n_segments: int
     ) -> Iterator[Chunk[SumTables]]:
         """Cut a catalogue into chunks that fit with their block sums."""
-        n_rows = sum(len(rows(block, fiftieths)) for block in (25, 10, 10, 5))
         for first, some in portions(
             clips,
-            bytes_a_frame=2 * n_rows + 12,
+            bytes_a_frame=bytes_a_frame(fiftieths),
             bytes_a_clip=40 * n_segments,
             most_bytes=self.memory_bytes,
             most_frames=_MOST_FRAMES,
@@ -199,6 +198,21 @@ class NumpyMatcher:
             index = int(chosen[row[i]])
             place = (int(chunk.live[clip[i]]) + chunk.first, int(scale[i]), int(start[i]))
             found[index].append(Match(index, 0, *place, c, *ratios(c, song.music_sum[index], b_sum)))
+
+
+def bytes_a_frame(fiftieths: Sequence[int]) -> int:
+    """Memory for one frame of a clip.
+
+    Parameters
+    ----------
+    fiftieths : the scales times 50
+
+    Returns
+    -------
+    int
+        12, and 2 for each row of block sums.
+    """
+    return 12 + 2 * sum(len(rows(block, fiftieths)) for block, _ in (PAIRS, *STAGES))
 
 
 def _alike(song: Song, chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:

@@ -28,8 +28,8 @@ from kernels.matching.low_rank import RANK
 from kernels.matching.room import Room
 
 PLACE_BITS = 24
-_PAIRS = (25, 8)  # frames of a block, neighbouring starts bounded together
-_STAGES = ((10, 4), (10, 1), (5, 1))
+PAIRS = (25, 8)  # frames of a block, neighbouring starts bounded together
+STAGES = ((10, 4), (10, 1), (5, 1))
 _MORE = 4
 _FEW = 0.5  # share of pairs that are refined in one turn
 _TELLING = 2**20  # starts after which a stage is judged
@@ -101,7 +101,7 @@ class Refinement:
         room = Room()
         pairs, *single = (
             Bounds(tables, segments, n_frames=n_frames, block=block, fold=fold, room=room)
-            for block, fold in (_PAIRS, *_STAGES)
+            for block, fold in (PAIRS, *STAGES)
         )
         work = [bounds.n_blocks / bounds.fold for bounds in single]
         costs = [one / two for one, two in pairwise(work)]

@@ -82,8 +82,8 @@ def test_a_match_by_hand():
         {"_SCORE_NS": 0.0, "_TERM_NS": 0.0},  # none is
         {"_FEW": 0.0, "_MORE": 1},  # a turn of few
         {"_FEW": 2.0},
-        {"_STAGES": ((10, 8), (5, 2), (5, 1))},
-        {"_STAGES": ((5, 1),), "_PAIRS": (10, 1)},
+        {"STAGES": ((10, 8), (5, 2), (5, 1))},
+        {"STAGES": ((5, 1),), "PAIRS": (10, 1)},
     ],
     ids=str,
 )
