@@ -23,7 +23,7 @@ from kernels.matching.blocks import UNIT, block_sums, rows
 from kernels.matching.low_rank import RANK, codes, low_rank, window
 from kernels.matching.room import Room
 
-_TILE = 2048  # positions summed at a time: rows of them stay in the cache
+_TILE = 4096  # positions summed at a time: rows of them stay in the cache
 _TINY = 2.0**-95
 
 Series = NDArray[np.floating]
@@ -91,7 +91,7 @@ class SumTable:
     ----------
     rows : Rows
     exponent : int
-        Sums are divided by 2^exponent, so that the largest is in [1/2, 1].
+        Sums are divided by 2^exponent, so that the largest is at most 1.
     codes : (rows, N) uint16, the node at or above each sum
     """
 
@@ -99,28 +99,32 @@ class SumTable:
         self, flat: NDArray[np.float32], n_positions: int, *, n_frames: int, fold: int, numerators: tuple[int, ...]
     ) -> None:
         self.rows = rows(n_frames, numerators)
-        taps = self.rows.taps()
-        window = np.zeros((taps.shape[1], _TILE + fold - 1), np.float32)
+        self.codes = np.zeros((len(self.rows), n_positions), np.uint16)
+        # what sums of neighbouring frames need does for most scales; if not, the sums themselves say
+        total = np.cumsum(flat, dtype=np.float64)
+        self.exponent = int(np.frexp((total[n_frames:] - total[:-n_frames]).max())[1])
+        while (largest := self._fill(flat, fold)) > 1:
+            self.exponent += int(np.frexp(largest)[1])
 
-        def sums(at: int) -> NDArray[np.float32]:
+    def _fill(self, flat: NDArray[np.float32], fold: int) -> float:
+        """Sum all blocks and find their nodes, as far as they are at most 1; the largest sum."""
+        taps = self.rows.taps() * np.float32(2.0**-self.exponent)
+        n_positions = self.codes.shape[1]
+        window = np.zeros((taps.shape[1], _TILE + fold - 1), np.float32)
+        sums = np.zeros((len(taps), window.shape[1]), np.float32)
+        largest = 0.0
+        for at in range(0, n_positions, _TILE):
             for tap, line in enumerate(window):
                 line[:] = flat[at + tap : at + tap + len(line)]
-            product: NDArray[np.float32] = taps @ window
-            return product
-
-        tiles = range(0, n_positions, _TILE)
-        largest = max(float(sums(at).max()) for at in tiles)
-        self.exponent = int(np.frexp(largest)[1])
-        self.codes = np.zeros((len(self.rows), n_positions), np.uint16)
-        for at in tiles:
-            found = sums(at)
+            np.matmul(taps, window, out=sums)
+            largest = max(largest, float(sums.max()))
             step = 1
             while step < fold:
-                np.maximum(found[:, :-step], found[:, step:], out=found[:, :-step])
+                np.maximum(sums[:, :-step], sums[:, step:], out=sums[:, :-step])
                 step *= 2
-            found *= np.float32(2.0**-self.exponent)
             n = min(_TILE, n_positions - at)
-            self.codes[:, at : at + n] = codes(found)[:, :n]
+            self.codes[:, at : at + n] = codes(sums)[:, :n]
+        return largest
 
 
 @dataclass(frozen=True, eq=False)

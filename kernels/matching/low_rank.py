@@ -65,7 +65,8 @@ def codes(sums: NDArray[np.float32]) -> NDArray[np.uint16]:
     code = bits + ((1 << _SHIFT) - 1)  # bits of positive floats rise with them
     code >>= _SHIFT
     code -= _BELOW - 1
-    np.maximum(code, bits > 0, out=code)
+    np.maximum(code, 1, out=code)
+    np.minimum(code, bits, out=code)  # only the bits of 0 are less than a code
     return code.astype(np.uint16)
 
 
