@@ -22,7 +22,7 @@ from kernels.calibration.records import JOINTS, Calibration
 from pipelines.devices import Devices
 from pipelines.files import write_beside
 from pipelines.outcome import DONE, NOTHING_DONE, Outcome
-from pipelines.twins import PoseSolvers
+from pipelines.solvers import PoseSolvers
 from schemas.settings import Settings
 
 

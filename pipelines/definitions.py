@@ -10,7 +10,8 @@ from pipelines.collection import ASSETS, freshness
 from pipelines.devices import Devices
 from pipelines.io_managers import EarlierTables, IndexIOManager, LakeIOManager, StageIOManager
 from pipelines.resources import GraphMemory, NoProgress, StudioFolder, studio_from_environment
-from pipelines.twins import Distances, Matches, PoseSolvers
+from pipelines.solvers import PoseSolvers
+from pipelines.twins import Distances, Matches
 
 
 def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> dg.Definitions:  # noqa: ANN401 - resources are of any type

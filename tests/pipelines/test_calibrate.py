@@ -154,8 +154,3 @@ def test_what_is_no_recording(tmp_path, name, data, word):
 def test_dagster_is_not_loaded_for_it():
     code = "import sys, pipelines.calibrate; sys.exit('dagster' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_solvers_are_built_once():
-    solvers = calibrating.PoseSolvers(calibrating.OpenClSettings())
-    assert solvers("gauss_newton") is solvers("gauss_newton")
