@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 from assets.formats import bvh, suit
 from kernels.calibration.records import JOINTS, SENSORS
 from kernels.synthetic.suit import made_up, swap
-from pipelines import calibrate as calibrating
 from pipelines.cli import app
 
 

@@ -13,7 +13,8 @@ METHODS = ("gauss_newton", "springs")
 
 @pytest.fixture
 def problem():
-    made = suit.made_up(5, n_frames=60)
+    how = suit.Disturbance(outlier_ratio=0.0, dropped_ratio=0.0)
+    made = suit.made_up(5, n_frames=60, disturbance=how)
     model = make_model(made.body.in_parent_sensor_m, made.body.in_child_sensor_m)
     return model, Stream(made.recording.position_xyz_m, made.recording.rotation_wxyz, np.ones((60, 17)))
 
