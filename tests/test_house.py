@@ -61,7 +61,6 @@ TESTED_ELSEWHERE = {
     "assets/formats/errors.py",
     "kernels/music/pulse_weights.py",
     "kernels/synthetic/grooves.py",
-    "pipelines/cli.py",
     "pipelines/collection.py",
     "pipelines/freshness.py",
     "pipelines/hmm_report.py",
