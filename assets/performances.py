@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
@@ -60,14 +61,14 @@ def pair(clips: Iterable[Danced], songs: Sequence[Music]) -> tuple[list[Performa
     by_name: dict[str, Music] = {}
     for name in (_file_name, lambda song: song.song_id, _stem):
         for song in ordered:
-            by_name.setdefault(name(song).lower(), song)
+            by_name.setdefault(_spelt(name(song)), song)
     by_stem = {song_key(_stem(song)): song for song in reversed(ordered)}
     found, troubles = [], []
     for clip in clips:
         if clip.performed_to.lower() == NO_SONG:
             continue
         if clip.performed_to:
-            named = by_name.get(PurePosixPath(clip.performed_to.lower().replace("\\", "/")).name)
+            named = by_name.get(PurePosixPath(_spelt(clip.performed_to).replace("\\", "/")).name)
             if named is None:
                 troubles.append(
                     f"{clip.path}: performed to {clip.performed_to!r}, which is no song of this studio; "
@@ -80,6 +81,11 @@ def pair(clips: Iterable[Danced], songs: Sequence[Music]) -> tuple[list[Performa
         if own is not None:
             found.append(Performance(clip.clip_id, own.song_id, clip.offset_s, "name"))
     return found, troubles
+
+
+def _spelt(name: str) -> str:
+    """Spell a name as it is compared: in small letters, with accents put together."""
+    return unicodedata.normalize("NFC", name.lower())
 
 
 def _file_name(song: Music) -> str:

@@ -4,7 +4,6 @@ The command, the sensor and the schedule share the planning here; the command al
 Dagster runs on the studio's own instance, so the UI shows them like any other.
 """
 
-import fcntl
 import os
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import dagster as dg
+import filelock
 from dagster_shared.error import SerializableErrorInfo
 
 from assets.formats import beside
@@ -20,6 +20,7 @@ from assets.partitions import SESSION, SONG, dagster_key, lake_key
 from pipelines.files import StudioError, why
 from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP, job_of
+from pipelines.processes import is_running, started
 from pipelines.resources import StudioFolder
 from schemas.keys import check_key
 
@@ -326,22 +327,23 @@ def exclusive(studio: StudioFolder) -> Iterator[None]:
     place = studio.root / "lake" / ".lock"
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        file = place.open("a")
+        lock = filelock.FileLock(place, blocking=False).acquire()
+    except filelock.Timeout as error:
+        raise StudioError(f"{studio.root}: another odori is building it; wait for it to finish") from error
     except OSError as error:
         raise StudioError(f"{studio.root}: cannot be written: {why(error)}") from error
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise StudioError(f"{studio.root}: another odori is building it; wait for it to finish") from error
+    with lock:
         yield
 
 
 def clear_after_kill(studio: StudioFolder, instance: dg.DagsterInstance) -> int:
     """Tidy up after a run that was killed: half-made files, and runs that Dagster still takes for running.
 
+    What another system named otherwise gets its name here.
+
     Only to be called while the studio is held.
     """
+    studio.lake.name_anew()
     removed: int = studio.lake.sweep() + beside.sweep(studio.dances)
     end_dead_runs(instance)
     return removed
@@ -357,35 +359,15 @@ UNFINISHED = (
 
 def own_tags() -> dict[str, str]:
     """Tags of a run that this process starts or asks for: by them it is known to be dead when the process is."""
-    return {PID_TAG: f"{os.getpid()} {_started(os.getpid())}"}
+    return {PID_TAG: f"{os.getpid()} {started(os.getpid())}"}
 
 
 def end_dead_runs(instance: dg.DagsterInstance, *, untagged: bool = False) -> None:
     """Report runs as failed whose process is gone; with ``untagged`` also those that were started by hand in the UI."""
     for run in instance.get_runs(dg.RunsFilter(statuses=list(UNFINISHED))):
-        pid, _, started = run.tags.get(PID_TAG, "").partition(" ")
-        if _started(int(pid)) != started if pid.isdigit() else untagged:
+        pid, _, since = run.tags.get(PID_TAG, "").partition(" ")
+        if not is_running(int(pid), since) if pid.isdigit() else untagged:
             instance.report_run_failed(run, "its process was killed; the next build does its work again")
-
-
-def _started(pid: int) -> str:
-    """When a process started, in the kernel's ticks, so that a number used again is not taken for it; "" when gone."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_text()
-    except FileNotFoundError:
-        if Path("/proc/self/stat").exists():
-            return ""
-    except OSError:
-        pass
-    else:
-        return text.rpartition(")")[2].split()[19]
-    try:  # no /proc here: whether it is alive must do
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return ""
-    except PermissionError:
-        pass
-    return "alive"
 
 
 # Odori prints nothing inside a run that its metadata and events do not say better: no log files beside each run.
@@ -413,15 +395,20 @@ def open_instance(studio: StudioFolder) -> dg.DagsterInstance:
         home.mkdir(parents=True, exist_ok=True)
         owner = home / "odori-studio"
         if not owner.exists():
-            owner.write_text(f"{studio.root}\n")
-        elif home != studio.root / ".dagster" and owner.read_text().strip() != str(studio.root):
+            owner.write_bytes(f"{studio.root}\n".encode("utf-8", "surrogateescape"))
+        elif home != studio.root / ".dagster" and (of := _owner(owner)) != str(studio.root):
             raise StudioError(
-                f"{home}: want Dagster's storage of {studio.root}, got that of {owner.read_text().strip()}; "
+                f"{home}: want Dagster's storage of {studio.root}, got that of {of}; "
                 "set DAGSTER_HOME to a folder of its own for each studio"
             )
         configuration = home / "dagster.yaml"
         if not configuration.exists():
-            configuration.write_text(_CONFIGURATION)
+            configuration.write_text(_CONFIGURATION, encoding="utf-8")
         return dg.DagsterInstance.from_config(str(home))
     except OSError as error:
         raise StudioError(f"{home}: cannot be written: {why(error)}") from error
+
+
+def _owner(place: Path) -> str:
+    """Read whose storage it is; the path of a studio need not be text of any encoding."""
+    return place.read_bytes().decode("utf-8", "surrogateescape").strip()

@@ -4,10 +4,12 @@ Each command prints a short report, or with ``--json`` exactly one object on sta
 standard error. Exit status: 0 done, 1 done but some inputs were refused, 2 nothing done.
 """
 
+import io
 import json
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,6 +36,21 @@ StudioOption = Annotated[
     typer.Option("--studio", help="The studio folder; else $ODORI_STUDIO, else ./studio.", show_default=False),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the report.")]
+
+
+def _say_version(is_asked: bool) -> None:
+    if is_asked:
+        sys.stdout.write(f"odori {version('odori')}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def odori(
+    is_version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_say_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Take options that belong to no command."""
 
 
 @app.command()
@@ -324,11 +341,25 @@ def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - a commands.Ou
     for line in result.troubles:
         TROUBLE.print(line)
     if as_json:
-        _answered.append(True)
-        sys.stdout.write(json.dumps(result.facts, ensure_ascii=False, sort_keys=True) + "\n")
+        _answer(result.facts)
     elif result.report:
         _say(result.report, as_json)
     raise typer.Exit(result.status)
+
+
+def _answer(facts: Mapping[str, Any]) -> None:
+    """Print the one JSON object: in UTF-8, whatever the console or the pipe would have it in."""
+    _answered.append(True)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
+    sys.stdout.write(json.dumps(facts, ensure_ascii=False, sort_keys=True) + "\n")
+
+
+def _settle_streams() -> None:
+    """Let no sign end a report: what the encoding of a console lacks is written as its number."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 class _Trouble:
@@ -350,8 +381,7 @@ class _Trouble:
             text = error.args[0] if isinstance(error, LookupError) and error.args else str(error)
             TROUBLE.print(f"odori: {text}")
             if self._as_json:
-                _answered.append(True)
-                sys.stdout.write(json.dumps({"error": str(text)}) + "\n")
+                _answer({"error": str(text)})
             raise typer.Exit(NOTHING_DONE) from error
 
 
@@ -368,11 +398,12 @@ def main() -> None:
     for library in ("OPENBLAS", "OMP", "MKL"):  # more threads change last bits: same inputs, same bytes
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     settle()
+    _settle_streams()
     try:
         app()
     except SystemExit as ended:
         if ended.code == NOTHING_DONE and "--json" in sys.argv and not _answered:  # a usage error, said by the parser
-            sys.stdout.write(json.dumps({"error": "the command line is wrong; standard error says how"}) + "\n")
+            _answer({"error": "the command line is wrong; standard error says how"})
         raise
 
 

@@ -32,8 +32,8 @@ def dances_facts(made: list[dict[str, Any]], troubles: list[str], n_asked: int) 
 
 def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
     """Gather what is told of one dance: its files, measures, costs, pins, licence, and how it differs from the best."""
-    folder = studio.dances / song
-    report = json.loads((folder / f"{method}.json").read_text())
+    folder = studio.dances_of(song)
+    report = json.loads((folder / f"{method}.json").read_bytes())
     steps = pl.DataFrame(studio.lake.table(CHOREOGRAPHY.name, f"{song}|{method}"))
     costs = {name.removesuffix("_cost"): float(steps[name].sum()) for name in COSTS}
     facts = {
@@ -213,7 +213,7 @@ def copy_out(facts: dict[str, Any], out: Path) -> None:
     """Copy a finished stage to where it was asked for."""
     source = Path(facts["usdz" if out.suffix == ".usdz" else "stage"])
     facts["out"] = str(out)
-    if out.resolve() == source.resolve():
+    if out.exists() and out.samefile(source):  # also by another spelling, where capitals do not count
         return
     if out.suffix == ".usdc":
         usd_package.copy_stage(out, source)

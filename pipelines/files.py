@@ -27,6 +27,8 @@ _WHY: Mapping[int, str] = {
 
 def why(error: OSError) -> str:
     """Say what a refused write means and what to do about it."""
+    if beside.is_held(error):
+        return "another program has it open, or writing is not allowed there; close it or mend the folder's permissions"
     return _WHY.get(error.errno or 0, f"{error.strerror or error}; see to the disk and run it again")
 
 

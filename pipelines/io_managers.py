@@ -154,7 +154,7 @@ class StageIOManager(LakeIOManager):
         """Write sound, stage, package and report, then the row."""
         if not isinstance(obj, Stage):
             raise TypeError(f"usd_animation: want a Stage, got {type(obj).__name__}")
-        folder = self._studio.dances / obj.song_id
+        folder = self._studio.dances_of(obj.song_id)
         try:
             written = write_dance(folder, obj)
         except OSError as error:
@@ -163,7 +163,7 @@ class StageIOManager(LakeIOManager):
             {
                 "song_id": obj.song_id,
                 "method_name": obj.method,
-                "stage_path": str(path.relative_to(self._studio.root)),
+                "stage_path": path.relative_to(self._studio.root).as_posix(),
                 "stage_sha256": tree.sha256(path),
                 "frame_count": obj.clip.n_frames,
                 "frame_rate_hz": obj.clip.frame_rate_hz,

@@ -14,6 +14,7 @@ from upath import UPath
 
 from assets import tables
 from assets.formats import beside
+from assets.formats.file_names import WINDOWS, file_name, key_of, name_anew
 from assets.lineage import Stamp
 from pipelines.files import LakeError, write_beside
 from schemas.catalog import TABLES
@@ -28,21 +29,24 @@ class Lake:
     Parameters
     ----------
     root : absolute path or URL that fsspec knows
+    windows : whether files are named as Windows wants them
     """
 
-    def __init__(self, root: UPath) -> None:
+    def __init__(self, root: UPath, *, windows: bool = WINDOWS) -> None:
         self.root = root
+        self._windows = windows
 
     def path(self, asset: str, key: str = "") -> UPath:
         """Place of a stored partition; of the whole table when the key is empty."""
-        return self.root / asset / f"{key or WHOLE}.parquet"
+        return self.root / asset / f"{file_name(key or WHOLE, windows=self._windows)}.parquet"
 
     def keys(self, asset: str) -> list[str]:
         """Partitions stored, sorted; empty when there are none."""
         folder = self.root / asset
         if not folder.is_dir():
             return []
-        return sorted(p.name.removesuffix(".parquet") for p in folder.iterdir() if p.name.endswith(".parquet"))
+        names = (p.name.removesuffix(".parquet") for p in folder.iterdir() if p.name.endswith(".parquet"))
+        return sorted(key_of(name, windows=self._windows) for name in names)
 
     def stamp(self, asset: str, key: str = "") -> Stamp | None:
         """Stamp of a stored partition; None when it is not stored or was written by something else."""
@@ -89,6 +93,13 @@ class Lake:
     def remove(self, asset: str, key: str) -> None:
         """Forget a partition; nothing happens when it is not stored."""
         self.path(asset, key).unlink(missing_ok=True)
+
+    def name_anew(self) -> int:
+        """Give files that came from Windows the names they have here; how many those were."""
+        folders = [p for p in self.root.iterdir() if p.is_dir()] if self.root.is_dir() else []
+        return sum(
+            name_anew(folder, suffix, windows=self._windows) for folder in folders for suffix in (".parquet", ".json")
+        )
 
     def sweep(self) -> int:
         """Delete what killed runs left beside; how many files that were."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from upath import UPath
 
 from assets import scan, sources
+from assets.formats.file_names import WINDOWS, file_name, key_of
 from assets.formats.settings import read_settings
 from assets.formats.tree import HashCache
 from assets.sources import Request, Song, Sources
@@ -31,15 +32,17 @@ class StudioFolder:
     Parameters
     ----------
     root : the folder with ``clips/`` and ``songs/``
+    windows : whether files are named as Windows wants them
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, *, windows: bool = WINDOWS) -> None:
         self.root = root.absolute()
-        self.lake = Lake(UPath(self.root / "lake"))
+        self.lake = Lake(UPath(self.root / "lake"), windows=windows)
+        self._windows = windows
 
     def frozen(self) -> "StudioFolder":
         """Give the studio as one run sees it: what was read once stays so, whatever is edited meanwhile."""
-        return _FrozenStudio(self.root)
+        return _FrozenStudio(self.root, windows=self._windows)
 
     def sources(self) -> Sources:
         """List what is there, hashed; files that did not change are not read again."""
@@ -64,23 +67,25 @@ class StudioFolder:
         found = {}
         for path in sorted(folder.glob("*.json")) if folder.is_dir() else []:
             try:
-                said = json.loads(path.read_text())
-                found[path.stem] = Request(**{**said, "pins": tuple(said.get("pins", ()))})
+                said = json.loads(path.read_bytes())
+                key = key_of(path.stem, windows=self._windows)
+                found[key] = Request(**{**said, "pins": tuple(said.get("pins", ()))})
             except (ValueError, TypeError, OSError):
                 continue  # not ours, or of another version: as if nobody had asked
         return found
 
     def remember(self, key: str, request: Request | None) -> None:
         """Keep what was asked of a dance; None forgets it."""
+        place = self.root / "lake" / "request" / f"{file_name(key, windows=self._windows)}.json"
         if request is None:
-            (self.root / "lake" / "request" / f"{key}.json").unlink(missing_ok=True)
+            place.unlink(missing_ok=True)
             return
         text = json.dumps(asdict(request), sort_keys=True)
-        write_beside(self.root / "lake" / "request" / f"{key}.json", lambda file: file.write(text.encode()))
+        write_beside(place, lambda file: file.write(text.encode()))
 
     def lost_stages(self, song: str, method: str) -> list[str]:
         """Names of a finished dance's files that are not there any more."""
-        folder = self.dances / song
+        folder = self.dances_of(song)
         names = ("song.wav", f"{method}.usdc", f"{method}.usdz", f"{method}.json", *self._cast_files(folder, method))
         return [name for name in names if not (folder / name).is_file()]
 
@@ -88,7 +93,7 @@ class StudioFolder:
     def _cast_files(folder: Path, method: str) -> list[str]:
         """Names of what a dance by a character of another file consists of besides."""
         try:
-            told = json.loads((folder / f"{method}.json").read_text())
+            told = json.loads((folder / f"{method}.json").read_bytes())
             return [f"{method}_character/character.usdc"] if "file" in told["provenance"].get("character", {}) else []
         except (OSError, ValueError, KeyError, AttributeError):
             return []
@@ -102,6 +107,10 @@ class StudioFolder:
     def dances(self) -> Path:
         """Folder of the finished stages."""
         return self.root / "dances"
+
+    def dances_of(self, song: str) -> Path:
+        """Folder of the finished stages of a song, by its key."""
+        return self.dances / file_name(song, windows=self._windows)
 
 
 class _FrozenStudio(StudioFolder):

@@ -83,6 +83,7 @@ def search(
     if train or not catalogue.is_current() or not all(catalogue.knows(t) for t in _texts(wish)):
         from pipelines.searchable import make_searchable  # Dagster
 
+        del catalogue  # Windows replaces no file that is mapped
         make_searchable(root, train=train, progress=progress)
         catalogue = Catalogue(root)
         catalogue.remember()

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from assets import search_tables, tables
 from assets.formats import bvh, motion_index
 from assets.formats.errors import FormatError
+from assets.formats.file_names import file_name
 from assets.formats.settings import read_settings
 from kernels.search.encoder import Encoder, from_arrays
 from kernels.search.windows import windows
@@ -85,7 +86,7 @@ class Catalogue:
     def is_current(self) -> bool:
         """Whether the index was made of the tables that there are now."""
         try:
-            seen = json.loads((self.lake / MOTION_INDEX.name / _SEEN).read_text())
+            seen = json.loads((self.lake / MOTION_INDEX.name / _SEEN).read_bytes())
         except (OSError, ValueError):
             return False
         return self.index is not None and bool(seen == self._state())
@@ -149,7 +150,7 @@ class Catalogue:
         clip_id : of a clip of the index
         session : its session
         """
-        path = self.lake / "canonical_pose" / f"{session}.parquet"
+        path = self.lake / "canonical_pose" / f"{file_name(session)}.parquet"
         table = pq.read_table(path, columns=["time_s", "position_xyz_m"], filters=pc.field("clip_id") == clip_id)
         return tables.to_array(table["position_xyz_m"]), tables.frame_rate_hz(table)
 

@@ -1,5 +1,7 @@
 """Who danced to what: by clips.csv, by name, and what cannot be paired."""
 
+import unicodedata
+
 from assets.performances import Danced, Music, Performance, pair
 
 SONGS = [
@@ -28,3 +30,12 @@ def test_a_song_that_is_not_there_is_told():
     assert found == []
     assert "clips/x.bvh: performed to 'delta'" in troubles[0]
     assert pair([], []) == ([], [])
+
+
+def test_accents_may_be_put_together_or_apart():
+    apart, together = (unicodedata.normalize(form, "Été.mid") for form in ("NFD", "NFC"))
+    assert apart != together
+    for here, there in ((apart, together), (together, apart)):
+        found, troubles = pair([Danced("x", "clips/x.bvh", here)], [Music("ete", f"songs/{there}", "midi")])
+        assert [f.song_id for f in found] == ["ete"]
+        assert troubles == []

@@ -1,5 +1,7 @@
 """What is a source, which session it belongs to, who gets a key that two want."""
 
+import unicodedata
+
 import pytest
 
 from assets.formats.tree import HashCache
@@ -219,3 +221,48 @@ def test_a_table_that_says_what_clips_are_is_never_one_itself(studio):
 def test_one_stem_as_bvh_and_recording_goes_to_the_first(studio):
     found = look(studio({"clips/s/a.bvh": b"x", "clips/s/a.csv": SUIT}))
     assert [bool(c.problem) for c in found.clips] == [False, True]
+
+
+def test_names_that_differ_in_capitals_alone_share_no_output(studio):
+    """Keys are in small letters: where capitals do not count, no file is written over another's."""
+    found = look(
+        studio(
+            {
+                "clips/Ayame/Walk.bvh": b"1",
+                "clips/Ayame/walk.BVH": b"2",
+                "clips/ayame/walk.bvh": b"3",
+                "clips/ayame/run.bvh": b"4",
+                "songs/Waltz.wav": b"5",
+                "songs/waltz.WAV": b"6",
+                "songs/WALTZ.mid": b"7",
+            }
+        )
+    )
+    read = [c for c in found.clips if not c.problem]
+    assert [(c.key, c.path) for c in read] == [
+        ("ayame-walk", "clips/Ayame/Walk.bvh"),
+        ("ayame-run", "clips/ayame/run.bvh"),
+    ]
+    assert {c.session for c in found.clips} == {"ayame"}
+    assert all("rename one of the two files" in c.problem for c in found.clips if c not in read)
+    assert {s.path: s.key for s in found.songs if not s.problem} == {
+        "songs/Waltz.wav": "waltz",
+        "songs/WALTZ.mid": "waltz_mid",
+    }
+    assert [s.path for s in found.songs if "rename one of the two files" in s.problem] == ["songs/waltz.WAV"]
+
+
+def test_names_that_differ_in_how_accents_are_put_together_are_one_name(studio):
+    apart, together = (unicodedata.normalize(form, "ガ") for form in ("NFD", "NFC"))
+    found = look(studio({f"songs/{apart}.wav": b"1", f"songs/{together}.wav": b"2"}))
+    assert len({s.key for s in found.songs}) == 1
+    assert len([s for s in found.songs if "rename one of the two files" in s.problem]) == 1
+
+
+def test_paths_of_sources_have_slashes(studio):
+    found = look(studio({"clips/a/b/one.bvh": b"1", "songs/x/y.mid": b"4", "songs/x/y.brief.toml": b""}))
+    assert (found.clips[0].path, found.songs[0].path, found.songs[0].brief) == (
+        "clips/a/b/one.bvh",
+        "songs/x/y.mid",
+        "songs/x/y.brief.toml",
+    )

@@ -51,6 +51,19 @@ def test_dance_of_the_small_studio(built):
     assert report["provenance"]["song"] == {"path": "songs/beat.wav", "sha256": digest}
 
 
+def test_a_copy_to_where_the_stage_is_already_leaves_it(built, tmp_path):
+    """By another spelling, or another name of the same file: where capitals do not count both are one."""
+    stage = tmp_path / "graph.usdz"
+    stage.write_bytes((built / "dances" / "beat" / "graph.usdz").read_bytes())
+    before = stage.stat().st_ino
+    other = tmp_path / "Other.usdz"
+    other.hardlink_to(stage)
+    dancing.copy_out({"usdz": str(stage)}, other)
+    assert (stage.stat().st_ino, other.stat().st_ino) == (before, before)
+    dancing.copy_out({"usdz": str(stage)}, tmp_path / "new.usdz")
+    assert (tmp_path / "new.usdz").read_bytes() == stage.read_bytes()
+
+
 def test_stage_holds_the_dance_of_the_lake(built):
     clip = usd_read.read_animation(built / "dances" / "beat" / "graph.usdz")
     pose = pq.read_table(built / "lake" / "dance_pose" / "beat|graph.parquet")

@@ -118,3 +118,27 @@ def test_forgetting_twice_is_no_error(lake, beats):
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS, errno.EACCES, errno.EIO])
 def test_every_refusal_of_a_disk_has_a_remedy(number):
     assert ";" in why(OSError(number, "whatever"))
+
+
+def test_on_windows_names_have_no_bar_and_keys_have(tmp_path, beats):
+    lake = Lake(UPath(tmp_path / "lake"), windows=True)
+    for key in ("waltz|graph", "con", "waltz"):
+        lake.write("motion_beat", key, beats, STAMP)
+        assert lake.table("motion_beat", key).equals(beats)
+    assert {p.name for p in (tmp_path / "lake" / "motion_beat").iterdir()} == {
+        "waltz%7Cgraph.parquet",
+        "con_.parquet",
+        "waltz.parquet",
+    }
+    assert lake.keys("motion_beat") == ["con", "waltz", "waltz|graph"]
+    lake.remove("motion_beat", "waltz|graph")
+    assert lake.keys("motion_beat") == ["con", "waltz"]
+
+
+def test_a_lake_of_windows_is_read_elsewhere_once_it_is_named_anew(tmp_path, beats):
+    Lake(UPath(tmp_path / "lake"), windows=True).write("motion_beat", "waltz|graph", beats, STAMP)
+    lake = Lake(UPath(tmp_path / "lake"), windows=False)
+    assert lake.stamp("motion_beat", "waltz|graph") is None
+    assert lake.name_anew() == 1
+    assert lake.stamp("motion_beat", "waltz|graph") == STAMP
+    assert lake.name_anew() == 0

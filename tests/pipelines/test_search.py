@@ -1,5 +1,6 @@
 """`odori search`, from files to hits."""
 
+import gc
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from assets.formats import bvh
 from kernels.synthetic.dancer import take
 from pipelines import commands
+from pipelines import searchable as making
 from pipelines.files import StudioError
 from pipelines.lake import Lake
 from pipelines.resources import NoProgress, StudioFolder
@@ -239,3 +241,24 @@ def test_a_pin_by_likeness_names_the_clip_and_those_like_it(searchable):
     assert wish.split(",")[0] == "day-step_0"
     assert wish.split(",")[1:] == clips_of(ask(searchable, "day-step_0", k=5))
     assert by_likeness(searchable, "12-16=step", progress=NoProgress) == "12-16=step"
+
+
+def test_no_file_of_the_index_is_mapped_while_it_is_made_anew(searchable, tmp_path, monkeypatch):
+    """Windows replaces no file that is mapped, by whomever."""
+    maps = Path("/proc/self/maps")
+    if not maps.is_file():
+        pytest.skip("what is mapped is told by Linux alone")
+    root = Path(shutil.copytree(searchable, tmp_path / "studio"))
+    mapped = []
+    make = making.make_searchable
+
+    def look_and_make(studio, **options):
+        gc.collect()
+        mapped.extend(line for line in maps.read_text(encoding="utf-8").splitlines() if str(root) in line)
+        make(studio, **options)
+
+    monkeypatch.setattr(making, "make_searchable", look_and_make)
+    (root / "clips" / "day" / "clips.csv").write_bytes(b"file,label\nstep_0.bvh,new\n")
+    (root / "lake" / "motion_index" / "seen.json").unlink()
+    assert ask(root, "day-step_0")["hits"]
+    assert mapped == []
