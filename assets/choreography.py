@@ -3,15 +3,16 @@
 import dagster as dg
 import pyarrow as pa
 
-from assets import licences, tables
+from assets.dancing import licences
+from assets.dancing.by_graph import by_graph, catalogue, direction_of, heard_song, poses_of, read_clips
+from assets.dancing.by_hmm import by_hmm, load_dancer
+from assets.dancing.by_matching import by_matching, load_matches
 from assets.declare import table_asset
-from assets.graph_path import by_graph, catalogue, direction_of, heard_song, poses_of, read_clips
-from assets.hmm_path import by_hmm, load_dancer
-from assets.hmm_tables import to_performances
-from assets.lineage import Part, Progress, Stored, repeatable
 from assets.partitions import DANCE, EVERY, base_method, lake_key
-from assets.sequence import by_matching, load_matches
-from assets.sources import Studio, request_of, request_version
+from assets.sources.sources import Studio, request_of, request_version
+from assets.stamps import Part, Progress, Stored, repeatable
+from assets.tables import pack as tables
+from assets.tables.hmm import to_performances
 from kernels.assembly.timing import cover
 from schemas.choreography import CHOREOGRAPHY
 

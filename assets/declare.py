@@ -146,3 +146,24 @@ def column_schema(table: Table) -> dg.TableSchema:
         constraints = dg.TableColumnConstraints(nullable=column.is_optional, unique=table.key == (column.name,))
         columns.append(dg.TableColumn(column.name, str(column.type), meaning, constraints))
     return dg.TableSchema(columns)
+
+
+def code_version(context: dg.AssetExecutionContext, asset: str) -> str:
+    """Read the code version of an asset of this run.
+
+    Parameters
+    ----------
+    context : of the step
+    asset : name of one of the assets it makes
+
+    Returns
+    -------
+    str
+        Empty where the asset declares none.
+
+    Raises
+    ------
+    KeyError
+        If the step makes no such asset.
+    """
+    return context.assets_def.code_versions_by_key[dg.AssetKey(asset)] or ""

@@ -18,13 +18,13 @@ from pathlib import Path
 import numpy as np
 from upath import UPath
 
-from assets import tables
 from assets.dance import load_clips
-from assets.direction import Song
-from assets.graph_path import Catalogue, Direction, by_graph, catalogue, heard_song, read_clips
+from assets.dancing.by_graph import Catalogue, Direction, by_graph, catalogue, heard_song, read_clips
+from assets.dancing.wishes import Song
+from assets.tables import pack as tables
 from kernels.types import Choreography, Clip, Float
 from pipelines.io_managers import StoredTable
-from pipelines.lake import Lake
+from pipelines.studio.lake import Lake
 from schemas.settings import Settings
 
 REPOSITORY = Path(__file__).parents[1]

@@ -17,11 +17,11 @@ from dagster_shared.error import SerializableErrorInfo
 
 from assets.formats import beside
 from assets.partitions import SESSION, SONG, dagster_key, lake_key
-from pipelines.files import StudioError, why
 from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP, job_of
 from pipelines.processes import is_running, started
-from pipelines.resources import StudioFolder
+from pipelines.studio.files import StudioError, why
+from pipelines.studio.folder import StudioFolder
 from schemas.keys import check_key
 
 # Stages in order; the groups of one stage run together, clip by clip carried over.

@@ -9,8 +9,9 @@ from pipelines.caches import settle
 from pipelines.collection import ASSETS, freshness
 from pipelines.devices import Devices
 from pipelines.io_managers import EarlierTables, IndexIOManager, LakeIOManager, StageIOManager
-from pipelines.resources import GraphMemory, NoProgress, StudioFolder, studio_from_environment
+from pipelines.resources import GraphMemory, NoProgress
 from pipelines.solvers import PoseSolvers
+from pipelines.studio.folder import StudioFolder, studio_from_environment
 from pipelines.twins import Distances, Matches
 
 

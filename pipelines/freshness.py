@@ -13,15 +13,15 @@ from typing import Literal
 
 import dagster as dg
 
-from assets import sources as source_kinds
-from assets.characters import character_version
+from assets.dancing.characters import character_version
 from assets.declare import KEEPS_KEY, METHODS_KEY, ONLY_FOR_KEY, SETTINGS_KEY, SOURCES_KEY
-from assets.lineage import Stamp, version_of
 from assets.partitions import ALTERNATIVES, METHODS, base_method
-from assets.sources import Sources
-from pipelines.files import StudioError
-from pipelines.lake import Lake
-from pipelines.resources import StudioFolder
+from assets.sources import sources as source_kinds
+from assets.sources.sources import Sources
+from assets.stamps import Stamp, version_of
+from pipelines.studio.files import StudioError
+from pipelines.studio.folder import StudioFolder
+from pipelines.studio.lake import Lake
 
 STAGE_IO_MANAGER = "stage"
 ON_DEMAND = ("search",)

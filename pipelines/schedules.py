@@ -4,7 +4,7 @@ import dagster as dg
 
 from pipelines import build
 from pipelines.collection import freshness
-from pipelines.resources import StudioFolder
+from pipelines.studio.folder import StudioFolder
 
 
 @dg.op(description="Brings catalogue and dances up to date, stage by stage, as `odori build --dances` does.")

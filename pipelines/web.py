@@ -13,8 +13,7 @@ from types import FrameType
 
 from pipelines import processes
 from pipelines.build import end_dead_runs, open_instance
-from pipelines.files import StudioError, why
-from pipelines.resources import StudioFolder
+from pipelines.studio.folder import existing
 
 
 def serve(root: Path, *, host: str, port: int) -> int:
@@ -47,22 +46,3 @@ def serve(root: Path, *, host: str, port: int) -> int:
         return 0
     finally:
         processes.end(children)
-
-
-def existing(root: Path) -> StudioFolder:
-    """Open a studio folder that is there.
-
-    Raises
-    ------
-    StudioError
-        If it is missing or cannot be listed.
-    """
-    try:
-        if not root.is_dir():
-            raise StudioError(
-                f"{root}: want a studio folder with clips/ and songs/ in it, got nothing there; "
-                "name one with --studio or ODORI_STUDIO, or try 'odori demo'"
-            )
-    except OSError as error:
-        raise StudioError(f"{root}: cannot be read: {why(error)}") from error
-    return StudioFolder(root)

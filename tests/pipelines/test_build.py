@@ -17,8 +17,8 @@ from kernels.opencl.choice import pick_device
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.files import StudioError
-from pipelines.resources import StudioFolder
+from pipelines.studio.files import StudioError
+from pipelines.studio.folder import StudioFolder
 
 
 def ran(outcome):

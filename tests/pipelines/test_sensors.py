@@ -10,9 +10,9 @@ import pytest
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.resources import StudioFolder
 from pipelines.schedules import nightly
 from pipelines.sensors import source_sensor
+from pipelines.studio.folder import StudioFolder
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from assets.formats import audio, beside, usd
 from assets.formats.audio import Audio
 from assets.formats.beside import MARK, sweep, written_beside
 from assets.formats.tree import File, HashCache
-from pipelines.files import LakeError, write_beside
+from pipelines.studio.files import LakeError, write_beside
 
 
 def test_the_file_is_whole_and_alone(tmp_path):
