@@ -20,7 +20,7 @@ from schemas.matching import MATCH
 
 
 class SegmentMatcher(Protocol):
-    """Finds the best clips of segments; see :class:`kernels.matching.search.Matcher`."""
+    """Finds the best clips of segments; see :class:`kernels.opencl.match.Matcher`."""
 
     def index(self, clips: Sequence[NDArray[Any]]) -> Any:  # noqa: ANN401 - what only the matcher itself reads
         """Prepare a catalogue for many songs.

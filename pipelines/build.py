@@ -29,6 +29,8 @@ STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("cata
 GROUPS = tuple(JOB_OF_GROUP)
 _RANGE_START, _RANGE_END = "dagster/asset_partition_range_start", "dagster/asset_partition_range_end"
 PID_TAG = "odori/pid"
+FindJob = Callable[[str], dg.JobDefinition]
+"""Gives a job by its name."""
 
 
 @dataclass(frozen=True)
@@ -186,9 +188,9 @@ def _neighbours(keys: list[str], kind: str, instance: dg.DagsterInstance) -> lis
     return runs
 
 
-def execute(batch: Batch, definitions: dg.Definitions, instance: dg.DagsterInstance) -> list[Trouble]:
+def execute(batch: Batch, find_job: FindJob, instance: dg.DagsterInstance) -> list[Trouble]:
     """Run a batch in this process; what failed."""
-    job = definitions.resolve_job_def(batch.job)
+    job = find_job(batch.job)
     result = job.execute_in_process(
         instance=instance,
         asset_selection=[dg.AssetKey(asset) for asset in batch.assets],
@@ -236,7 +238,7 @@ def _cause(where: str, error: SerializableErrorInfo) -> str:
 
 def bring_up_to_date(
     studio: StudioFolder,
-    definitions: dg.Definitions,
+    find_job: FindJob,
     instance: dg.DagsterInstance,
     state: Freshness,
     *,
@@ -259,11 +261,11 @@ def bring_up_to_date(
             for batch in planned.without(given_up):  # what it would be made from may have failed a moment ago
                 tried.add(batch)
                 report.ran.append(batch)
-                failed = execute(batch, definitions, instance)
+                failed = execute(batch, find_job, instance)
                 if failed and len(batch.keys) > 1:  # one partition's trouble must not stop its neighbours: one by one
                     for single in batch.singles():
                         tried.add(single)
-                        failed = execute(single, definitions, instance)
+                        failed = execute(single, find_job, instance)
                         report.troubles += failed
                         given_up |= unmade(single, state) if failed else set()
                 else:

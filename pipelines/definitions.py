@@ -26,10 +26,12 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
     settle()
     folder = studio or studio_from_environment()
     devices: dict[str, Devices] = {}
+    made: list[dg.Definitions] = []
     # Made for each run anew: a run keeps to the settings and sources it began with, and its stamps say so.
     resources: dict[str, Any] = {
         "studio": dg.ResourceDefinition(lambda _: folder.frozen()),
         "earlier": EarlierTables(folder.lake),
+        "find_job": dg.ResourceDefinition(lambda _: made[0].resolve_job_def),
         "progress": NoProgress(),
         "devices": dg.ResourceDefinition(
             lambda context: _devices(devices, context.resources.studio.settings().opencl.device),
@@ -59,7 +61,7 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
             required_resource_keys={"studio"},
         ),
     }
-    return dg.Definitions(
+    definitions = dg.Definitions(
         assets=ASSETS,
         jobs=[*jobs.JOBS, schedules.rebuild_all],
         schedules=[schedules.nightly],
@@ -67,6 +69,8 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         resources=resources | overrides,
         executor=dg.in_process_executor,
     )
+    made.append(definitions)
+    return definitions
 
 
 def _devices(known: dict[str, Devices], wanted: str) -> Devices:

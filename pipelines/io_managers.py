@@ -96,7 +96,7 @@ class LakeIOManager(dg.IOManager):
         if part.sources:
             inputs = inputs | {"sources": part.sources}
         stamp = Stamp(
-            self._freshness.assets[asset].code_version,
+            self._freshness.assets[asset].code_version_of(part.key),
             self._freshness.settings_version(asset, part.key),
             inputs,
             content_version(table),

@@ -197,3 +197,23 @@ def parts_in_use(session_keys: Sequence[str]) -> dict[str, int]:
     """
     found = (_PART.fullmatch(key) for key in session_keys)
     return {m["session"]: int(m["n_parts"]) for m in found if m}
+
+
+def base_method(method: str) -> str:
+    """Find the method an alternative is one of: ``graph`` of ``graph_2``.
+
+    Parameters
+    ----------
+    method : str, a method's name, or that of an alternative
+    """
+    return method.partition("_")[0]
+
+
+def alternative_number(method: str) -> int:
+    """Tell which dance of its method: 1 for the best, 2 and on for alternatives.
+
+    Parameters
+    ----------
+    method : str, a method's name, or that of an alternative
+    """
+    return int(method.partition("_")[2] or 1)

@@ -1,26 +1,26 @@
 """A dance through the motion graph, as its director wants it: pins, licences, alternatives."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import dagster as dg
 import numpy as np
 import polars as pl
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from assets.dancing import licences, wishes
-from assets.dancing.danced import Danced
+from assets.dancing.asked import SOFT_WISH, Direction
+from assets.dancing.danced import Danced, Markdown
+from assets.dancing.method import DanceOrder, Method
 from assets.dancing.pose_pins import Poses, to_pose_pins
+from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import GRAPH_PARTS, DirectionError, Nodes, Parts
-from assets.dancing.wishes import Song as SongBeats
-from assets.partitions import alternative_number
 from assets.plots import draw as plots
-from assets.sources.sources import Studio, brief_of, request_of
+from assets.reading.clips import read_clips
+from assets.reading.songs import PlayedSong, heard_song
 from assets.stamps import Stored
-from assets.tables import matching as matching_tables
-from kernels.assembly.timing import blend_widths, cover, trim
+from assets.tables import pack as tables
+from kernels.assembly.timing import blend_widths, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts, intensity_price
 from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, to_choreography
@@ -28,56 +28,12 @@ from kernels.graph.pins import Conflict, Pin, Reach, admitted, find_conflict, st
 from kernels.graph.program import StepPrice
 from kernels.graph.structure import structure_pins
 from kernels.graph.transitions import THRESHOLD
-from kernels.types import BeatGrid, Choreography, Float, Int, MotionGraph
+from kernels.types import Choreography, Float, Int, MotionGraph
 from schemas.keys import is_mirrored, seen_label, source_clip
-from schemas.pins import PinWish, parse_pin
 from schemas.settings import DanceSettings, PathSettings, Settings
-
-SOFT_WISH = 1.0
-"""Price of a beat that a soft wish would have otherwise: the document's, about that of a seam."""
 
 POSE_WEIGHT_PER_M = 100.0
 """Price of a pose a metre from the one that is wished, in the mean of its joints: some centimetres are worth a seam."""
-
-
-@dataclass(frozen=True)
-class Direction:
-    """What is asked of one dance.
-
-    Parameters
-    ----------
-    wishes : pins, in the order given
-    is_soft : whether they only cost where they are not kept
-    allow : licences of the clips that may be danced; all where empty
-    alternative : 1 for the best dance, 2 for the best that differs from it, and so on
-    """
-
-    wishes: tuple[PinWish, ...] = ()
-    is_soft: bool = False
-    allow: tuple[str, ...] = ()
-    alternative: int = 1
-
-
-def direction_of(studio: Studio, key: str) -> Direction:
-    """Gather what is asked of a dance: pins of the brief and of the command, licences, which alternative.
-
-    Raises
-    ------
-    dg.Failure
-        If a remembered pin is none.
-    """
-    song, method = key.split("|")
-    brief = brief_of(studio, song)
-    try:
-        wishes = [*brief.pin, *(parse_pin(text) for text in request_of(studio, key).pins)]
-    except ValueError as error:
-        raise dg.Failure(str(error), allow_retries=False) from error
-    return Direction(
-        tuple({wish.text: wish for wish in wishes}.values()),
-        brief.pins == "soft",
-        brief.allow,
-        alternative_number(method),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,19 +102,19 @@ def poses_of(canonical_pose: Stored, settings: Settings) -> Poses:
     return Poses(canonical_pose, threshold)
 
 
-def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direction) -> Danced:
+def by_graph(known: Catalogue, song: PlayedSong, settings: Settings, asked: Direction) -> Danced:
     """Find the best way through the motion graph for a song, as it is asked for.
 
     Raises
     ------
-    dg.Failure
-        If no dance can be had, or not with these pins; its metadata hold the conflict and the ways out.
+    RefusalError
+        If no dance can be had, or not with these pins; it holds the conflict and the ways out.
     """
     graph = known.graph
     costs = path_costs(settings.path)
     pins = pins_of(known, song, asked)
     if not known.is_allowed.any() and len(known.is_allowed):
-        raise dg.Failure(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}", allow_retries=False)
+        raise RefusalError(f"no clip may be danced: none has a licence of {', '.join(asked.allow)}")
     strength = strength_price(known, song, settings.path)
     terms = terms_of(known, song, pins, asked, costs, strength)
 
@@ -195,14 +151,14 @@ def by_graph(known: Catalogue, song: SongBeats, settings: Settings, asked: Direc
         {f"{name}_cost": values[kept] for name, values in every.items()},
         {
             "cost": path.total_cost,
-            "costs": dg.MetadataValue.json({name: float(values.sum()) for name, values in every.items()}),
+            "costs": ({name: float(values.sum()) for name, values in every.items()}),
             "seams": int(steps.has_seam.sum()),
             "clips": len(set(steps.clip_id)),
             "steps_outside_warp_bounds": int(path.is_outside[kept].sum()),
             "parts_danced_again": n_repeated,
             "shared_with_the_best": shared_ratio(graph, path, found[0]) if len(found) > 1 else 1.0,
-            "pins": dg.MetadataValue.json(kept_pins(pins, song, path, known)),
-            "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
+            "pins": (kept_pins(pins, song, path, known)),
+            "phrases": Markdown(plots.phrase_table(steps)),
         },
         [pin_of_step(pins, int(k), int(d)) for k, d in zip(path.beat_index[kept], path.beat_span[kept], strict=True)],
     )
@@ -222,9 +178,9 @@ class Terms:
 
 
 def terms_of(
-    known: Catalogue, song: SongBeats, pins: Sequence[Pin], asked: Direction, costs: PathCosts, strength: Float
+    known: Catalogue, song: PlayedSong, pins: Sequence[Pin], asked: Direction, costs: PathCosts, strength: Float
 ) -> Terms:
-    """Gather what a search is to keep and to pay; dg.Failure where pins conflict."""
+    """Gather what a search is to keep and to pay; RefusalError where pins conflict."""
     mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
     from_any = any(pin.steps and pin.first == 0 for pin in pins)
     if not asked.is_soft:
@@ -246,40 +202,21 @@ def _softened(pin: Pin) -> StepPrice:
     }
 
 
-def reach_of(known: Catalogue, song: SongBeats, costs: PathCosts) -> Reach:
+def reach_of(known: Catalogue, song: PlayedSong, costs: PathCosts) -> Reach:
     """Make ready the question whether pins can be kept in a song."""
     starts = np.flatnonzero(known.is_allowed)
     return Reach(known.graph, song.grid_s, costs=costs, starts=starts, allowed=known.is_allowed)
 
 
-def strength_price(known: Catalogue, song: SongBeats, settings: PathSettings) -> Float:
+def strength_price(known: Catalogue, song: PlayedSong, settings: PathSettings) -> Float:
     """Price of movement unlike the music in strength, (K, N); zeros where the song's is not known."""
     if song.intensity is None or not settings.intensity_weight:
         return np.zeros((len(song.grid_s) - 1, len(known.graph.clip_index)))
     return intensity_price(song.intensity, known.graph, weight=settings.intensity_weight)
 
 
-def heard_song(
-    beats: BeatGrid, duration_s: float, *, feature: pa.Table | None = None, repeat: pa.Table | None = None
-) -> SongBeats:
-    """Gather what a dance knows of its song.
-
-    Parameters
-    ----------
-    beats : BeatGrid of at least two
-    duration_s : float, seconds, > 0
-    feature, repeat : rows of ``music_feature`` and ``music_repeat`` of the song, or None
-    """
-    grid_s, _ = cover(beats.time_s, duration_s)
-    intensity = None
-    if feature is not None and feature.num_rows:
-        intensity = matching_tables.strength_between(feature, grid_s)
-    repeats = matching_tables.to_music_repeat(repeat, grid_s) if repeat is not None else []
-    return SongBeats(grid_s, beats, duration_s, intensity, repeats)
-
-
-def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
-    """Bring what is wished onto beats and nodes; dg.Failure where a pin names no place of the song."""
+def pins_of(known: Catalogue, song: PlayedSong, asked: Direction) -> list[Pin]:
+    """Bring what is wished onto beats and nodes; RefusalError where a pin names no place of the song."""
     try:
         posed: dict[str, Pin] = {}
         if any(wish.pose for wish in asked.wishes):
@@ -289,20 +226,18 @@ def pins_of(known: Catalogue, song: SongBeats, asked: Direction) -> list[Pin]:
             posed = to_pose_pins(asked.wishes, *where, weight=POSE_WEIGHT_PER_M)
         return [posed.get(wish.text) or wishes.to_pin(wish, song, known.nodes) for wish in asked.wishes]
     except DirectionError as error:
-        raise place_failure(error) from error
+        raise no_place(error) from error
 
 
-def place_failure(error: DirectionError) -> dg.Failure:
+def no_place(error: DirectionError) -> RefusalError:
     """Say that a pin names no place of the song, for a person and for a machine."""
-    facts: dict[str, Any] = {
-        "conflict": dg.MetadataValue.json([str(error).partition(": ")[0]]),
-        "ways_out": dg.MetadataValue.json([]),
-    }
-    return dg.Failure(str(error), metadata=facts, allow_retries=False)
+    return RefusalError(str(error), conflict=[str(error).partition(": ")[0]], ways_out=[])
 
 
-def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], asked: Direction, costs: PathCosts) -> None:
-    """Raise dg.Failure where pins cannot be kept, naming the fewest of them that cannot and what would help."""
+def refuse_conflict(
+    known: Catalogue, song: PlayedSong, pins: Sequence[Pin], asked: Direction, costs: PathCosts
+) -> None:
+    """Raise RefusalError where pins cannot be kept, naming the fewest of them that cannot and what would help."""
     reach = reach_of(known, song, costs)
     usable = [replace(pin, nodes=pin.nodes & known.is_allowed) for pin in pins]
     if not reach.is_danceable:
@@ -310,26 +245,22 @@ def refuse_conflict(known: Catalogue, song: SongBeats, pins: Sequence[Pin], aske
     choices = [{n: m & known.is_allowed for n, m in known.nodes.instead_of(wish).items()} for wish in asked.wishes]
     conflict = find_conflict(reach, usable, choices=choices)
     if conflict is not None:
-        raise conflict_failure(conflict, usable, asked, song, known.nodes)
+        raise conflicting(conflict, usable, asked, song, known.nodes)
 
 
-def conflict_failure(
+def conflicting(
     conflict: Conflict,
     pins: Sequence[Pin],
     asked: Direction,
-    song: SongBeats,
+    song: PlayedSong,
     nodes: Nodes,
     parts: Parts = GRAPH_PARTS,
-) -> dg.Failure:
-    """Say which pins cannot be kept and what would help, for a person and, in the metadata, for a machine."""
+) -> RefusalError:
+    """Say which pins cannot be kept and what would help, for a person and for a machine."""
     told = wishes.sentences(conflict, pins, asked.wishes, song, nodes, parts)
     ways = [wishes.way_out(way, pins, asked.wishes, song) for way in conflict.ways_out]
-    facts: dict[str, Any] = {
-        "conflict": dg.MetadataValue.json([asked.wishes[i].text for i in conflict.pin_index]),
-        "why": told[0],
-        "ways_out": dg.MetadataValue.json(ways),
-    }
-    return dg.Failure("; ".join(told), metadata=facts, allow_retries=False)
+    pinned = [asked.wishes[i].text for i in conflict.pin_index]
+    return RefusalError("; ".join(told), conflict=pinned, why=told[0], ways_out=ways)
 
 
 def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:
@@ -337,7 +268,7 @@ def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:
     return next((pin.name for pin in pins if beat < pin.last and beat + span > pin.first), None)
 
 
-def kept_pins(pins: Sequence[Pin], song: SongBeats, path: Path, known: Catalogue) -> list[dict[str, object]]:
+def kept_pins(pins: Sequence[Pin], song: PlayedSong, path: Path, known: Catalogue) -> list[dict[str, object]]:
     """Facts of each pin for machines: whether it is kept, from when to when, by which clips."""
     clip: dict[int, str] = {}
     node: dict[int, int] = {}
@@ -395,7 +326,7 @@ def search(
             if error.reason == "no_nodes":
                 break
     nothing = reason is not None and reason.reason == "no_nodes"
-    raise dg.Failure(f"no clip can be danced: {reason}" if nothing else str(reason), allow_retries=False)
+    raise RefusalError(f"no clip can be danced: {reason}" if nothing else str(reason))
 
 
 def chosen_steps(
@@ -408,6 +339,32 @@ def chosen_steps(
     return replace(steps, blend_s=width), kept
 
 
-def read_clips(parts: Sequence[pa.Table]) -> pl.DataFrame:
-    """Gather the rows of all sessions' clips that were read."""
-    return pl.concat([pl.DataFrame(t) for t in parts]).filter(pl.col("state") == "read")
+def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
+    """Find the best way through the stored motion graph; see :class:`assets.dancing.method.Method`.
+
+    Parameters
+    ----------
+    inputs : the tables of :data:`METHOD`, by name
+    order : DanceOrder
+
+    Raises
+    ------
+    RefusalError
+        As :func:`by_graph`.
+    """
+    graph, clip_ids = tables.to_motion_graph(inputs["motion_graph_node"].read(), inputs["motion_graph_edge"].read())
+    poses = poses_of(inputs["canonical_pose"], order.settings)
+    known = catalogue(graph, clip_ids, read_clips(inputs["clip"]), order.direction.allow, poses=poses)
+    feature, repeat = (inputs[name].read(order.song_id) for name in ("music_feature", "music_repeat"))
+    song = heard_song(order.beats, order.duration_s, feature=feature, repeat=repeat)
+    return by_graph(known, song, order.settings, order.direction)
+
+
+METHOD = Method(
+    name="graph",
+    version="5",
+    inputs=("clip", "motion_graph_node", "motion_graph_edge", "canonical_pose", "music_feature", "music_repeat"),
+    settings=("path", "dance.blend_s"),
+    choose=choose,
+    has_alternatives=True,
+)

@@ -3,22 +3,24 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import dagster as dg
 import numpy as np
 import polars as pl
 import pyarrow as pa
 from numpy.typing import NDArray
 
 from assets.dancing import hmm_wishes, licences
-from assets.dancing.by_graph import Direction
-from assets.dancing.danced import Danced
+from assets.dancing.asked import Direction
+from assets.dancing.danced import Danced, Markdown
+from assets.dancing.method import DanceOrder, Method
 from assets.dancing.recordings import choose_recordings, ends_of
+from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import Nodes
-from assets.dancing.wishes import Song as SongBeats
 from assets.plots import draw as plots
 from assets.plots import hmm as hmm_plots
+from assets.reading.clips import read_clips
 from assets.reading.hearing import hear
-from assets.stamps import Stored
+from assets.reading.songs import PlayedSong, heard_song
+from assets.stamps import Stored, repeatable
 from assets.tables import hmm as hmm_tables
 from assets.tables.hmm import ClipMotions
 from kernels.assembly.timing import blend_widths, trim
@@ -82,13 +84,11 @@ def load_dancer(
 
     Raises
     ------
-    dg.Failure
+    RefusalError
         If there is no motion to dance.
     """
     if not choreography_model.num_rows:
-        raise dg.Failure(
-            "no clip can be danced: none has a motion from braking to braking; add clips that move", allow_retries=False
-        )
+        raise RefusalError("no clip can be danced: none has a motion from braking to braking; add clips that move")
     every = hmm_tables.all_motions(key_pose.read(key) for key in key_pose.keys)
     subject = settings.choreography_model.subject
     own = clips.filter(pl.col("subject") == subject) if subject else clips
@@ -101,7 +101,7 @@ def load_dancer(
             if asked.allow
             else "is free to be changed and has a motion of known kind"
         )
-        raise dg.Failure(f"no clip may be danced: none {why}", allow_retries=False)
+        raise RefusalError(f"no clip may be danced: none {why}")
     model = hmm_tables.to_model(choreography_model, melody_weight=settings.choreography_model.melody_weight)
     facts = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
     pinned = {
@@ -162,7 +162,7 @@ def by_hmm(
     dancer: Dancer,
     percussion: pa.Table,
     melody: pa.Table,
-    song: SongBeats,
+    song: PlayedSong,
     canonical_pose: Stored,
     settings: Settings,
     asked: Direction,
@@ -174,7 +174,7 @@ def by_hmm(
 
     Raises
     ------
-    dg.Failure
+    RefusalError
         If the tempo of the song leaves no motion a length it can be danced in, or pins cannot be kept.
     """
     warmth = settings.hmm_path.temperature if temperature is None else temperature
@@ -192,7 +192,7 @@ def by_hmm(
     )
     reach = SpanReach(places, parts=music.parts)
     if not reach.is_danceable:
-        raise dg.Failure(_no_length(music, motions.end_s - motions.start_s), allow_retries=False)
+        raise RefusalError(_no_length(music, motions.end_s - motions.start_s))
     pins = hmm_wishes.kept_or_refused(reach, dancer.nodes, song, asked)
     wishes = [Wish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
     wish_price = hmm_wishes.price(asked) / music.parts
@@ -250,8 +250,8 @@ def by_hmm(
         "basic_motions_danced": len(np.unique(spans.state)),
         "as_the_model_alone_ratio": _shared(spans, alone, len(music.log_likelihood)),
         "music_adds": dancer.evidence.music_adds,
-        "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
-        "states": dg.MetadataValue.md(hmm_plots.timeline(edge_s, spans.state, song.grid_s)),
+        "phrases": Markdown(plots.phrase_table(steps)),
+        "states": Markdown(hmm_plots.timeline(edge_s, spans.state, song.grid_s)),
     }
     spanned = zip(spans.start[span_of].tolist(), spans.length[span_of].tolist(), strict=True)
     served = [hmm_wishes.served(pins, music.parts, start, length) for start, length in spanned]
@@ -323,3 +323,53 @@ def _no_length(music: Music, length_s: Float) -> str:
         f"no motions of known kinds cover its beats: a beat lasts {step_s:.2f} s and motions {length_s.min():.2f} to "
         f"{length_s.max():.2f} s; add clips near that tempo, or set beats.octave in the song's brief"
     )
+
+
+def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
+    """Dance a song by the stored model of the dancer; see :class:`assets.dancing.method.Method`.
+
+    Parameters
+    ----------
+    inputs : the tables of :data:`METHOD`, by name
+    order : DanceOrder
+
+    Raises
+    ------
+    RefusalError
+        As :func:`load_dancer` and :func:`by_hmm`.
+    """
+    dancer = load_dancer(
+        inputs["choreography_model"].read(),
+        inputs["music_evidence"].read(),
+        inputs["key_pose"],
+        {performed.clip_id for performed in hmm_tables.to_performances(inputs["performance"].read())},
+        read_clips(inputs["clip"]),
+        asked=order.direction,
+        settings=order.settings,
+    )
+    with repeatable():
+        return by_hmm(
+            dancer,
+            inputs["percussion"].read(order.song_id),
+            inputs["melody"].read(order.song_id),
+            heard_song(order.beats, order.duration_s),
+            inputs["canonical_pose"],
+            order.settings,
+            order.direction,
+            temperature=order.temperature,
+            seed=order.seed,
+        )
+
+
+METHOD = Method(
+    name="hmm",
+    version="5",
+    inputs=(
+        *("clip", "canonical_pose", "key_pose", "performance"),
+        *("choreography_model", "music_evidence", "percussion", "melody"),
+    ),
+    settings=("hmm_path", "choreography_model", "dance.blend_s"),
+    choose=choose,
+    draws=True,
+    learns=True,
+)

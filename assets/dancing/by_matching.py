@@ -4,18 +4,21 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import dagster as dg
 import numpy as np
 import pyarrow as pa
 
-from assets.dancing.danced import Danced
+from assets.dancing import licences
+from assets.dancing.danced import Danced, Markdown
+from assets.dancing.method import DanceOrder, Method
+from assets.dancing.refusal import RefusalError
 from assets.plots import draw as plots
 from assets.plots import matching as matching_plots
-from assets.stamps import Stored
+from assets.reading.clips import read_clips
+from assets.stamps import Stored, repeatable
 from assets.tables import matching as matching_tables
 from assets.tables import pack as tables
 from assets.tables.matching import Rhythm, StoredMatches
-from kernels.assembly.timing import blend_widths
+from kernels.assembly.timing import blend_widths, cover
 from kernels.matching import connect, intensity, path
 from kernels.matching.pieces import ease_pace, longest_first, motion_under, other_starts, snap_start, split_span
 from kernels.matching.score import SCALE_DENOMINATOR, ratios, similarity
@@ -169,11 +172,11 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
 
     Raises
     ------
-    dg.Failure
+    RefusalError
         If there is no clip longer than one frame.
     """
     if not any(clip.duration_s > 0 for clip in found.clips.values()):
-        raise dg.Failure("no clip can be danced: none is longer than one frame; add clips", allow_retries=False)
+        raise RefusalError("no clip can be danced: none is longer than one frame; add clips")
     spans, pieces = pieces_of(found, beat_s, settings.match_path)
     clip_ids = sorted({p.clip_id for ps in pieces for p in ps})
     index = {clip: i for i, clip in enumerate(clip_ids)}
@@ -234,8 +237,8 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         "clips": len(set(steps.clip_id)),
         "starts_snapped_to_clip_beats": sum(p.is_snapped for p in used),
         "spans_without_a_match": sum(p.rank_number == 0 for p in used),
-        "phrases": dg.MetadataValue.md(plots.phrase_table(steps)),
-        "choice": dg.MetadataValue.md(matching_plots.chosen(spans, used, chosen)),
+        "phrases": Markdown(plots.phrase_table(steps)),
+        "choice": Markdown(matching_plots.chosen(spans, used, chosen)),
     }
     return Danced(steps, costs, metadata)
 
@@ -475,3 +478,43 @@ def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str,
             first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
             usable_s = first / moved.frame_rate_hz, last / moved.frame_rate_hz
             yield moved.clip_id, link_directions(position, root, CANONICAL.parent), usable_s
+
+
+def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
+    """Dance a song by its stored matches; see :class:`assets.dancing.method.Method`.
+
+    Parameters
+    ----------
+    inputs : the tables of :data:`METHOD`, by name
+    order : DanceOrder
+
+    Raises
+    ------
+    RefusalError
+        If licences forbid every clip, or as :func:`by_matching`.
+    """
+    allow = order.direction.allow
+    licence_of = dict(read_clips(inputs["clip"]).select("clip_id", "licence").iter_rows())
+    free = licences.free_to_join(licence_of, allow)
+    if licence_of and not free:
+        why = f"has a licence of {', '.join(allow)}" if allow else "may be changed"
+        raise RefusalError(f"no clip may be danced: none {why}")
+    tables_of_song = (inputs[name] for name in ("match", "music_segment", "music_feature"))
+    of_clips = (inputs[name] for name in ("motion_feature", "motion_beat"))
+    found = load_matches(order.song_id, *tables_of_song, *of_clips, may_dance=free)
+    beat_s, _ = cover(order.beats.time_s, order.duration_s)
+    with repeatable():
+        return by_matching(found, inputs["canonical_pose"], beat_s, order.settings)
+
+
+METHOD = Method(
+    name="matching",
+    version="5",
+    inputs=(
+        *("clip", "canonical_pose", "motion_feature", "motion_beat"),
+        *("match", "music_segment", "music_feature"),
+    ),
+    settings=("match_path", "dance.blend_s"),
+    choose=choose,
+    keeps_pins=False,
+)

@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from assets.formats import tree, usd_character
 from assets.formats.errors import FormatError
 from assets.formats.usd_character import Copy, Rig
-from assets.sources.sources import Sources, Studio, brief_of, fingerprint, request_of
+from assets.sources.sources import FilePath, Sources, Studio, brief_of, fingerprint, request_of
 from assets.stamps import Stored
 from assets.tables import pack as tables
 from kernels.skeleton import grounding, kinematics
@@ -53,10 +52,10 @@ def character_version(studio: Studio, key: str, sources: Sources | None = None) 
     return fingerprint([text, tree.sha256(place) if place is not None else "missing"])
 
 
-def find_file(studio: Studio, text: str) -> Path | None:
+def find_file(studio: Studio, text: str) -> FilePath | None:
     """Find the file of a character: at its place, below the studio, or beside the songs and their briefs."""
     name = usd_character.split(text)[0]
-    places = [Path(name)] if Path(name).is_absolute() else [studio.file(name), studio.file(f"songs/{name}")]
+    places = [studio.file(name), studio.file(f"songs/{name}")]  # of an absolute path both are that path
     return next((place for place in places if place.is_file()), None)
 
 

@@ -7,11 +7,18 @@ from typing import Any
 from kernels.types import Choreography, Float, Int
 
 
+class Markdown(str):
+    """Text that is shown as Markdown: a table, or a picture."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Danced:
     """Steps a method chose, their costs by column (0 for the columns of other methods), and what to show of them.
 
-    ``states`` are basic motions by step, where the method has them.
+    ``metadata`` are numbers, texts, :class:`Markdown`, and lists and mappings of these; ``states`` are basic motions by
+    step, where the method has them.
     """
 
     steps: Choreography

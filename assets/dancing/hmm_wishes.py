@@ -2,25 +2,26 @@
 
 from collections.abc import Sequence
 
-import dagster as dg
-
 from assets.dancing import wishes
-from assets.dancing.by_graph import SOFT_WISH, Direction, conflict_failure, place_failure
-from assets.dancing.wishes import DirectionError, Nodes, Parts, Song
+from assets.dancing.asked import SOFT_WISH, Direction
+from assets.dancing.by_graph import conflicting, no_place
+from assets.dancing.refusal import RefusalError
+from assets.dancing.wishes import DirectionError, Nodes, Parts
+from assets.reading.songs import PlayedSong
 from kernels.graph.pins import Pin, find_conflict
 from kernels.hmm.pins import SpanReach
 
 MOTION_PARTS = Parts("motions of known kinds", "row of motions")
 
 
-def kept_or_refused(reach: SpanReach, nodes: Nodes, song: Song, asked: Direction) -> list[Pin]:
+def kept_or_refused(reach: SpanReach, nodes: Nodes, song: PlayedSong, asked: Direction) -> list[Pin]:
     """Bring what is wished onto beats and motions; hard pins can be kept together.
 
     Parameters
     ----------
     reach : SpanReach of the song
     nodes : clip, label and style of each recorded motion
-    song : Song
+    song : PlayedSong
     asked : Direction
 
     Returns
@@ -29,27 +30,27 @@ def kept_or_refused(reach: SpanReach, nodes: Nodes, song: Song, asked: Direction
 
     Raises
     ------
-    dg.Failure
-        Where a pin names no place of the song or a pose, or pins conflict; its metadata hold the conflict and the ways
+    RefusalError
+        Where a pin names no place of the song or a pose, or pins conflict; it holds the conflict and the ways
         out.
     """
     posed = [wish.text for wish in asked.wishes if wish.pose]
     if posed:
-        raise dg.Failure(
+        raise RefusalError(
             f"{', '.join(posed)}: poses are pinned by the graph method alone; pin a clip, label or style, or dance it "
             "with --method graph",
-            metadata={"conflict": dg.MetadataValue.json(posed), "ways_out": dg.MetadataValue.json([])},
-            allow_retries=False,
+            conflict=posed,
+            ways_out=[],
         )
     try:
         pins = [wishes.to_pin(wish, song, nodes) for wish in asked.wishes]
     except DirectionError as error:
-        raise place_failure(error) from error
+        raise no_place(error) from error
     conflict = None
     if pins and not asked.is_soft:
         conflict = find_conflict(reach, pins, choices=[nodes.instead_of(wish) for wish in asked.wishes])
     if conflict is not None:
-        raise conflict_failure(conflict, pins, asked, song, nodes, MOTION_PARTS)
+        raise conflicting(conflict, pins, asked, song, nodes, MOTION_PARTS)
     return pins
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from assets.dancing.wishes import DirectionError, Song, stretch
+from assets.dancing.wishes import DirectionError, stretch
+from assets.reading.songs import PlayedSong
 from assets.stamps import Stored
 from assets.tables import pack as tables
 from kernels.graph.distance import pose_distance
@@ -118,14 +119,20 @@ class Poses:
 
 
 def to_pose_pins(
-    wishes: Sequence[PinWish], song: Song, graph: MotionGraph, clip_ids: tuple[str, ...], poses: Poses, *, weight: float
+    wishes: Sequence[PinWish],
+    song: PlayedSong,
+    graph: MotionGraph,
+    clip_ids: tuple[str, ...],
+    poses: Poses,
+    *,
+    weight: float,
 ) -> dict[str, Pin]:
     """Bring wishes for poses onto beats and nodes.
 
     Parameters
     ----------
     wishes : PinWish; those for a pose count
-    song : Song
+    song : PlayedSong
     graph, clip_ids : the motion graph of N nodes, and its clips
     poses : Poses
     weight : float, >= 0, price of a metre
@@ -203,7 +210,7 @@ class _Moment:
     ``times`` (len(steps), N), NaN where a step cannot be danced, are empty there.
     """
 
-    def __init__(self, song: Song, graph: MotionGraph, wish: PinWish) -> None:
+    def __init__(self, song: PlayedSong, graph: MotionGraph, wish: PinWish) -> None:
         grid_s = song.grid_s
         last = len(grid_s) - 1
         moment_s = moment_of(wish, song)
@@ -225,13 +232,13 @@ class _Moment:
         self.times = np.array(rows).reshape(len(rows), len(graph.time_s))
 
 
-def moment_of(wish: PinWish, song: Song) -> float:
+def moment_of(wish: PinWish, song: PlayedSong) -> float:
     """Find the moment of the song in which a pose is to be shown.
 
     Parameters
     ----------
     wish : PinWish that names a pose
-    song : Song
+    song : PlayedSong
 
     Returns
     -------

@@ -7,18 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from assets.dancing.by_graph import (
-    Catalogue,
-    Direction,
-    path_costs,
-    pins_of,
-    reach_of,
-    search,
-    strength_price,
-    terms_of,
-)
-from assets.dancing.wishes import Song as SongBeats
+from assets.dancing.asked import Direction
+from assets.dancing.by_graph import Catalogue, path_costs, pins_of, reach_of, search, strength_price, terms_of
 from assets.dancing.wishes import stretch
+from assets.reading.songs import PlayedSong
 from kernels.graph.path import STEPS, first_beats, more_than_any
 from kernels.graph.pins import admitted
 from kernels.graph.program import Program
@@ -47,7 +39,7 @@ class Asked:
     to_s: float
 
 
-def place_of(text: str, song: SongBeats) -> Asked:
+def place_of(text: str, song: PlayedSong) -> Asked:
     """Find a place as a pin names it: ``42``, ``12.5-16``, ``beat:8``, ``bar:3-4``, ``start``, ``end``.
 
     Raises
@@ -60,7 +52,7 @@ def place_of(text: str, song: SongBeats) -> Asked:
     return Asked(text, first, last, float(max(song.grid_s[first], 0.0)), float(min(song.grid_s[last], song.duration_s)))
 
 
-def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direction, place: Asked) -> dict[str, Any]:
+def propose(known: Catalogue, song: PlayedSong, settings: Settings, asked: Direction, place: Asked) -> dict[str, Any]:
     """Price everything that could be pinned at a place, other pins kept.
 
     Parameters
@@ -80,7 +72,7 @@ def propose(known: Catalogue, song: SongBeats, settings: Settings, asked: Direct
 
     Raises
     ------
-    dg.Failure
+    RefusalError
         If the pins that are asked for cannot be kept.
     """
     solved = list(_solved(known, song, settings.path, asked, place))
@@ -176,7 +168,7 @@ def _least(through: Float, group: Int, n: int) -> tuple[Float, Int]:
 
 
 def _solved(
-    known: Catalogue, song: SongBeats, settings: PathSettings, asked: Direction, place: Asked
+    known: Catalogue, song: PlayedSong, settings: PathSettings, asked: Direction, place: Asked
 ) -> Iterator[tuple[Proposals, float]]:
     """Solve the song as the search would: from first beats, then from any, past the bounds where there is no other way.
 
@@ -219,7 +211,7 @@ def _solved(
             return
 
 
-def _shown_with(place: Asked, song: SongBeats) -> set[int]:
+def _shown_with(place: Asked, song: PlayedSong) -> set[int]:
     """Music intervals of a place, and all that repeat them or that they repeat."""
     found = set(range(place.first, place.last))
     while True:

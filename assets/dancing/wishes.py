@@ -8,39 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assets.reading.songs import PlayedSong
 from kernels.graph.pins import Conflict, Pin, WayOut
-from kernels.music.repeats import Repeat
-from kernels.types import BeatGrid, Float
 from schemas.pins import PinWish
 
 
 class DirectionError(ValueError):
     """A pin names no place of this song; the message says which places there are."""
-
-
-@dataclass(frozen=True, eq=False)
-class Song:
-    """The beats of a song as its dance counts them.
-
-    Parameters
-    ----------
-    grid_s : (K + 1,) float64, seconds, the beats the dance covers, those before and after the song's own included
-    beats : BeatGrid, the song's own
-    duration_s : float, seconds, > 0
-    intensity : (K,) float, how strong each interval of the grid is, or None where it is not known
-    repeats : stretches of the grid that play earlier ones again
-    """
-
-    grid_s: Float
-    beats: BeatGrid
-    duration_s: float
-    intensity: Float | None = None
-    repeats: Sequence[Repeat] = ()
-
-    @property
-    def own(self) -> NDArray[np.int64]:
-        """Place in the grid of each of the song's own beats."""
-        return np.searchsorted(self.grid_s, self.beats.time_s - 1e-9)
 
 
 @dataclass(frozen=True)
@@ -97,13 +71,13 @@ class Nodes:
         return found
 
 
-def to_pin(wish: PinWish, song: Song, nodes: Nodes) -> Pin:
+def to_pin(wish: PinWish, song: PlayedSong, nodes: Nodes) -> Pin:
     """Bring one wish onto beats and nodes.
 
     Parameters
     ----------
     wish : PinWish
-    song : Song
+    song : PlayedSong
     nodes : Nodes
 
     Returns
@@ -121,7 +95,7 @@ def to_pin(wish: PinWish, song: Song, nodes: Nodes) -> Pin:
     return Pin(wish.text, first, last, nodes.wished(wish))
 
 
-def stretch(wish: PinWish, song: Song) -> tuple[int, int]:
+def stretch(wish: PinWish, song: PlayedSong) -> tuple[int, int]:
     """Find the music intervals of a pin, first <= k < last.
 
     Raises
@@ -152,7 +126,9 @@ def stretch(wish: PinWish, song: Song) -> tuple[int, int]:
     return min(first, int(whole[-1])), int(np.clip(max(last, int(whole[0]) + 1), first + 1, n))
 
 
-def _counted(wish: PinWish, unit: str, first: int, end: int, number: NDArray[np.int64], song: Song) -> tuple[int, int]:
+def _counted(
+    wish: PinWish, unit: str, first: int, end: int, number: NDArray[np.int64], song: PlayedSong
+) -> tuple[int, int]:
     """Intervals from the beat where a count begins to the one where another does."""
     n = len(song.grid_s) - 1
     counts = range(int(number[0]), int(number[-1]) + 1)
@@ -169,7 +145,7 @@ def sentences(
     conflict: Conflict,
     pins: Sequence[Pin],
     wishes: Sequence[PinWish],
-    song: Song,
+    song: PlayedSong,
     nodes: Nodes,
     parts: Parts = GRAPH_PARTS,
 ) -> list[str]:
@@ -221,7 +197,7 @@ def _within(pins: Sequence[Pin]) -> str:
     return f" ({between} beat{'s' * (gaps != [1])} between them)"
 
 
-def way_out(way: WayOut, pins: Sequence[Pin], wishes: Sequence[PinWish], song: Song) -> str:
+def way_out(way: WayOut, pins: Sequence[Pin], wishes: Sequence[PinWish], song: PlayedSong) -> str:
     """Write a way out as a person would type it: the pin first, then how it differs."""
     pin, wish = pins[way.pin_index], wishes[way.pin_index]
     if way.choice:
@@ -252,7 +228,7 @@ def _near(wish: PinWish, nodes: Nodes) -> str:
     return f"; there are {', '.join(near)}" if near else ""
 
 
-def kept(pins: Sequence[Pin], song: Song, clip_of_interval: Mapping[int, str]) -> list[dict[str, object]]:
+def kept(pins: Sequence[Pin], song: PlayedSong, clip_of_interval: Mapping[int, str]) -> list[dict[str, object]]:
     """Facts of pins that are kept, for machines: text, seconds, clips danced there."""
     return [
         {

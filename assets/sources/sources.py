@@ -18,6 +18,9 @@ from assets.formats.errors import FormatError
 from assets.sources.performances import Danced, Music, pair
 from schemas.settings import Brief, Settings
 
+FilePath = Path
+"""Place of a file of a studio, for those who hand it on and open nothing themselves."""
+
 
 @dataclass(frozen=True)
 class Clip:

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from assets.dancing.methods import USUAL
 from assets.formats.errors import FormatError
-from assets.partitions import METHODS
 from assets.sources.sources import Song
 from pipelines.commands.search import by_likeness
 from pipelines.freshness import Freshness
@@ -29,7 +29,7 @@ def briefed_method(studio: StudioFolder, song: Song) -> str:
     try:
         return studio.brief(song).method
     except FormatError:
-        return METHODS[0]
+        return USUAL
 
 
 def wanted_songs(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[Song]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from assets.partitions import ALTERNATIVES, METHODS, MOST_ALTERNATIVES, base_method
+from assets.dancing.methods import METHODS, MOST_ALTERNATIVES
 from assets.sources.sources import Request
 from pipelines import build as building
 from pipelines.collection import freshness
@@ -15,6 +15,7 @@ from pipelines.commands.session import Session
 from pipelines.commands.status import songs_of
 from pipelines.studio.files import StudioError
 from pipelines.studio.folder import existing
+from schemas.keys import base_method
 
 
 def dance_songs(
@@ -49,13 +50,16 @@ def dance_songs(
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")
     methods = {song.key: _ways(method or briefed_method(studio, song), alternatives) for song in songs}
     keys = {f"{song}|{chosen}" for song, ways in methods.items() for chosen in ways}
-    if temperature is not None and not any(key.endswith("|hmm") for key in keys):
-        raise StudioError("--temperature: want the method hmm, which draws dances, got another; add --method hmm")
+    if temperature is not None and not any(METHODS[base_method(key.split("|")[1])].draws for key in keys):
+        able = " or ".join(method.name for method in METHODS.values() if method.draws)
+        raise StudioError(
+            f"--temperature: want the method {able}, which draws dances, got another; name it by --method"
+        )
     before = studio.requests()
     for key in sorted(keys):
         studio.remember(key, Request(frame_rate_hz or 0.0, pins, character, temperature, seed))
     names = {song.key for song in songs}
-    if any(base_method(chosen) == "hmm" for ways in methods.values() for chosen in ways):
+    if any(METHODS[base_method(chosen)].learns for ways in methods.values() for chosen in ways):
         names |= work.state.sources.performed_songs  # what the dancer danced to is what the model learns from
     report = work.run(
         building.GROUPS,
@@ -88,6 +92,7 @@ def dance_songs(
 
 def _ways(method: str, alternatives: int) -> tuple[str, ...]:
     """Name the dances to make of a method: itself, and its alternatives."""
-    if alternatives > 1 and method != "graph":
-        raise StudioError(f"--alternatives: want the method graph, which has them, got {method}")
-    return (method, *ALTERNATIVES[: alternatives - 1])
+    if alternatives > 1 and not METHODS[method].has_alternatives:
+        able = " or ".join(other.name for other in METHODS.values() if other.has_alternatives)
+        raise StudioError(f"--alternatives: want the method {able}, which has them, got {method}")
+    return (method, *(f"{method}_{number}" for number in range(2, alternatives + 1)))

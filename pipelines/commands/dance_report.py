@@ -9,10 +9,12 @@ from typing import Any
 import polars as pl
 
 from assets.dancing import pose_pins
-from assets.dancing.by_graph import direction_of, poses_of
-from assets.dancing.wishes import Song, stretch
+from assets.dancing.asked import direction_of
+from assets.dancing.by_graph import poses_of
+from assets.dancing.methods import METHODS
+from assets.dancing.wishes import stretch
 from assets.formats import usd_package
-from assets.partitions import alternative_number, base_method
+from assets.reading.songs import PlayedSong
 from assets.stage import COSTS
 from assets.tables import pack as tables
 from kernels.assembly.timing import cover
@@ -21,7 +23,7 @@ from pipelines.io_managers import StoredTable
 from pipelines.studio.files import StudioError, write_beside
 from pipelines.studio.folder import StudioFolder
 from schemas.choreography import CHOREOGRAPHY
-from schemas.keys import mirrored, seen_label
+from schemas.keys import alternative_number, base_method, mirrored, seen_label
 from schemas.pins import PinWish
 
 
@@ -52,7 +54,7 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
         "character": report["provenance"].get("character"),
         "pins": _pin_facts(studio, song, method, steps),
     }
-    if method == "hmm":
+    if METHODS[base_method(method)].learns:
         model = hmm_report.model_facts(studio.lake, subject=studio.settings().choreography_model.subject)
         facts["model"] = model | {"notes": [*model["notes"], *hmm_report.dance_notes(report)]}
     if alternative_number(method) > 1:
@@ -102,7 +104,7 @@ def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame
         return []
     beats = tables.to_music_beat(studio.lake.table("music_beat", song))
     duration_s = max(studio.lake.table("song", song)["duration_s"].to_pylist())
-    played = Song(cover(beats.time_s, duration_s)[0], beats, duration_s)
+    played = PlayedSong(cover(beats.time_s, duration_s)[0], beats, duration_s)
     clips = {row["clip_id"]: row for s in studio.lake.keys("clip") for row in studio.lake.table("clip", s).to_pylist()}
     posed = _Posed(studio, song, method, played) if any(wish.pose for wish in wishes) else None
     facts = []
@@ -129,7 +131,7 @@ def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame
 class _Posed:
     """What a finished dance shows at the moments of pins of a pose."""
 
-    def __init__(self, studio: StudioFolder, song: str, method: str, played: Song) -> None:
+    def __init__(self, studio: StudioFolder, song: str, method: str, played: PlayedSong) -> None:
         lake, key = studio.lake, f"{song}|{method}"
         self._played = played
         self._lineage = pl.DataFrame(lake.table("frame_lineage", key))

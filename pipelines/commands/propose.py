@@ -4,12 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import dagster as dg
-
 from assets.dancing import proposals
-from assets.dancing.by_graph import catalogue, direction_of, heard_song, poses_of, read_clips
-from assets.partitions import METHODS
-from assets.sources.sources import Request
+from assets.dancing.asked import direction_of
+from assets.dancing.by_graph import catalogue, poses_of
+from assets.dancing.methods import USUAL
+from assets.dancing.refusal import RefusalError
+from assets.reading.clips import read_clips
+from assets.reading.songs import heard_song
 from assets.tables import pack as tables
 from pipelines import build as building
 from pipelines.commands.asked import pin_texts, wanted_songs
@@ -48,35 +49,22 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
         at = proposals.place_of(place, played)
     except ValueError as error:
         raise StudioError(f"--propose: {str(error).replace(f'{place}=anything', place)}") from error
-    asked = direction_of(_Asked(studio, f"{song}|graph", pins), f"{song}|graph")
+    asked = direction_of(studio, f"{song}|graph", pins=pins)
     graph, clip_ids = tables.to_motion_graph(lake.table("motion_graph_node"), lake.table("motion_graph_edge"))
-    clips = read_clips([lake.table("clip", session) for session in lake.keys("clip")])
+    clips = read_clips(StoredTable(lake, "clip", lake.keys("clip")))
     poses = poses_of(StoredTable(lake, "canonical_pose", lake.keys("canonical_pose")), studio.settings())
     known = catalogue(graph, clip_ids, clips, asked.allow, poses=poses)
     try:
         found = proposals.propose(known, played, studio.settings(), asked, at)
-    except dg.Failure as refused:
-        facts = {
-            name: value.value for name, value in refused.metadata.items() if name in ("conflict", "why", "ways_out")
-        }
-        return Outcome(NOTHING_DONE, {"error": str(refused.description), **facts}, troubles=[str(refused.description)])
+    except RefusalError as refused:
+        facts = {"error": refused.sentence, **refused.facts}
+        return Outcome(NOTHING_DONE, facts, troubles=[refused.sentence])
     said: dict[str, Any] = {"song": song, "place": place, "from_s": at.from_s, "to_s": at.to_s}
     facts = {**said, "pins": [wish.text for wish in asked.wishes], **found}
     if found["best_cost"] is None:
         trouble = f"{song}: cannot be danced at all with what may be danced; 'odori dance' says why"
         return Outcome(NOTHING_DONE, {"error": trouble}, troubles=[trouble])
     return Outcome(DONE, facts, _report(facts))
-
-
-class _Asked(StudioFolder):
-    """A studio in which a dance is asked for with pins, without remembering it."""
-
-    def __init__(self, studio: StudioFolder, key: str, pins: Sequence[str]) -> None:
-        super().__init__(studio.root)
-        self._asked = {key: Request(pins=tuple(pins))}
-
-    def requests(self) -> dict[str, Request]:
-        return self._asked
 
 
 def _report(facts: Mapping[str, Any]) -> str:
@@ -128,7 +116,7 @@ def propose_pins(
     songs = wanted_songs(work.state, [wanted], studio)
     if len(songs) > 1:
         raise StudioError(f"--propose: want one song, got {len(songs)}")
-    key = f"{songs[0].key}|{METHODS[0]}"
+    key = f"{songs[0].key}|{USUAL}"
     needed = {name for name in work.state.needed_for(key) if work.state.assets[name].kind != "dance"}
     report = work.run(building.GROUPS, keys=lambda kind, one: kind != "song" or one == songs[0].key, assets=needed)
     try:

@@ -45,7 +45,13 @@ class Session:
                 building.clear_after_kill(self.studio, instance)
                 definitions = build_definitions(self.studio, progress=bar, devices=self.devices)
                 return building.bring_up_to_date(
-                    self.studio, definitions, instance, self.state, groups=groups, keys=keys, assets=assets
+                    self.studio,
+                    definitions.resolve_job_def,
+                    instance,
+                    self.state,
+                    groups=groups,
+                    keys=keys,
+                    assets=assets,
                 )
         except DBAPIError as error:  # what was stored before is whole: tables are written beside and renamed
             place = self.studio.dagster_home

@@ -12,17 +12,14 @@ import polars as pl
 from assets.dancing import licences
 from assets.stage import lineage_of
 from assets.tables.pack import frame_rate_hz
+from pipelines.collection import freshness
+from pipelines.commands.asked import briefed_method, wanted_songs
 from pipelines.commands.outcome import DONE, Outcome
 from pipelines.studio.files import StudioError
-from pipelines.studio.folder import StudioFolder
+from pipelines.studio.folder import StudioFolder, existing
 from schemas.keys import mirrored, seen_label
 
 STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
-
-
-from pipelines.collection import freshness
-from pipelines.commands.asked import briefed_method, wanted_songs
-from pipelines.studio.folder import existing
 
 
 @dataclass(frozen=True)

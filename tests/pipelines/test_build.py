@@ -300,7 +300,11 @@ def test_a_studio_on_windows_is_fresh_danced_and_has_no_name_windows_refuses(stu
     for name in ("choreography", "usd_animation"):
         folder.lake.remove(name, "beat|graph")
     report = building.bring_up_to_date(
-        folder, build_definitions(folder), building.open_instance(folder), freshness(folder), groups=building.GROUPS
+        folder,
+        build_definitions(folder).resolve_job_def,
+        building.open_instance(folder),
+        freshness(folder),
+        groups=building.GROUPS,
     )
     assert {asset for batch in report.ran for asset in batch.assets} >= {"choreography", "usd_animation"}
     assert report.failed == []

@@ -275,7 +275,7 @@ def test_an_interrupted_match_leaves_what_was_there(studio, monkeypatch):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kernels.matching.search.Matcher.matches", stop)
+    monkeypatch.setattr("kernels.opencl.match.Matcher.matches", stop)
     assert dance(studio).status == 2
     assert lake(studio).path("match", "beat").read_bytes() == before
     assert not list((studio / "lake").rglob(".tmp-*"))

@@ -94,7 +94,7 @@ def test_settings_edited_during_a_run_count_next_time(studio, monkeypatch):
     folder = StudioFolder(studio)
     monkeypatch.setattr(motion, "motion_beats", edit)
     batch = building.Batch("rebuild_motion", ("motion_beat",), ("ayame", "kaede"))
-    assert building.execute(batch, build_definitions(folder), building.open_instance(folder)) == []
+    assert building.execute(batch, build_definitions(folder).resolve_job_def, building.open_instance(folder)) == []
     assert freshness(folder).state("motion_beat", "ayame").state == "stale"
     settings.write_text("[motion_beat]\ncomponent = 2\n")
     assert freshness(folder).state("motion_beat", "ayame").state == "fresh"

@@ -1,11 +1,11 @@
 """Which dance is sought first: from where, and within which bounds."""
 
-import dagster as dg
 import numpy as np
 import polars as pl
 import pytest
 
 from assets.dancing.by_graph import catalogue, path_costs, search
+from assets.dancing.refusal import RefusalError
 from kernels.types import MotionGraph
 from schemas.keys import mirrored
 from schemas.settings import PathSettings
@@ -38,9 +38,9 @@ def test_any_beat_at_a_good_pace_comes_before_a_first_beat_at_a_bad_one(interval
 def test_no_dance_at_all_is_a_sentence():
     none = np.zeros(0, np.int64)
     empty = MotionGraph(none, np.zeros(0), none, none, none, np.zeros(0))
-    with pytest.raises(dg.Failure, match="no clip can be danced"):
+    with pytest.raises(RefusalError, match="no clip can be danced"):
         search(empty, np.arange(3) * 0.5, COSTS)
-    with pytest.raises(dg.Failure, match="path: want a dance to music beat 6"):
+    with pytest.raises(RefusalError, match="path: want a dance to music beat 6"):
         search(one_clip(0.5), np.arange(7) * 0.5, COSTS)
 
 

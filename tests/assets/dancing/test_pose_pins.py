@@ -8,7 +8,8 @@ import pyarrow as pa
 import pytest
 
 from assets.dancing.pose_pins import Poses, moment_of, shown_pose, to_pose_pins
-from assets.dancing.wishes import DirectionError, Song
+from assets.dancing.wishes import DirectionError
+from assets.reading.songs import PlayedSong
 from assets.stamps import ClipStamp, Stamp
 from assets.tables import pack as tables
 from kernels.graph.costs import PathCosts
@@ -81,7 +82,7 @@ def song_of(first_s, duration_s=4.0):
     time_s = np.arange(first_s, duration_s + 0.5, 0.5)
     grid_s = np.append(first_s - 0.5, time_s) if first_s > 0 else time_s
     number = np.arange(len(time_s))
-    return Song(grid_s, BeatGrid(time_s, number // 4 + 1, number % 4 + 1, np.ones(len(time_s))), duration_s)
+    return PlayedSong(grid_s, BeatGrid(time_s, number // 4 + 1, number % 4 + 1, np.ones(len(time_s))), duration_s)
 
 
 def pins(text, song, graph, poses, weight=1.0):

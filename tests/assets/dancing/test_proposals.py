@@ -2,13 +2,15 @@
 
 from dataclasses import replace
 
-import dagster as dg
 import numpy as np
 import pytest
 
-from assets.dancing.by_graph import Catalogue, Direction, by_graph
+from assets.dancing.asked import Direction
+from assets.dancing.by_graph import Catalogue, by_graph
 from assets.dancing.proposals import place_of, propose
-from assets.dancing.wishes import DirectionError, Nodes, Song
+from assets.dancing.refusal import RefusalError
+from assets.dancing.wishes import DirectionError, Nodes
+from assets.reading.songs import PlayedSong
 from kernels.graph.nodes import beat_nodes
 from kernels.music.repeats import Repeat
 from kernels.types import BeatGrid, MotionGraph
@@ -24,7 +26,7 @@ def song():
     time_s = np.arange(13) * 0.5
     number = np.arange(13)
     beats = BeatGrid(time_s, number // 4 + 1, number % 4 + 1, np.ones(13))
-    return Song(time_s, beats, 6.0)
+    return PlayedSong(time_s, beats, 6.0)
 
 
 @pytest.fixture
@@ -72,7 +74,7 @@ def test_extra_cost_is_what_the_pin_costs(known, song, place, pins):
     for kind, names in found["out_of_reach"].items():
         for name in names:
             wish = parse_pin(f"{place}={'clip:' if kind == 'clips' else ''}{name}")
-            with pytest.raises(dg.Failure):
+            with pytest.raises(RefusalError):
                 by_graph(known, song, PLAIN, replace(asked, wishes=(*asked.wishes, wish)))
 
 
@@ -93,7 +95,7 @@ def test_what_licences_forbid_is_not_proposed(known, song):
 
 def test_pins_that_conflict_are_refused(known, song):
     asked = Direction((parse_pin("5=crawl"),))
-    with pytest.raises(dg.Failure, match="5=crawl"):
+    with pytest.raises(RefusalError, match="5=crawl"):
         propose(known, song, PLAIN, asked, place_of("1", song))
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from assets.dancing.wishes import DirectionError, Nodes, Song, kept, sentences, stretch, to_pin, way_out
+from assets.dancing.wishes import DirectionError, Nodes, kept, sentences, stretch, to_pin, way_out
+from assets.reading.songs import PlayedSong
 from kernels.graph.pins import Conflict, WayOut
 from kernels.types import BeatGrid
 from schemas.pins import parse_pin
@@ -19,7 +20,7 @@ def song():
     beats = BeatGrid(
         time_s=time_s, bar_number=(number + 3) // 4 + 1, beat_in_bar_number=(number + 3) % 4 + 1, confidence=np.ones(16)
     )
-    return Song(np.arange(18) * 0.5, beats, 8.3)
+    return PlayedSong(np.arange(18) * 0.5, beats, 8.3)
 
 
 @pytest.fixture
@@ -84,7 +85,7 @@ def test_places_that_are_not_there(song, nodes, text, word):
 
 def test_bars_that_are_not_known(song, nodes):
     none = np.zeros(16, int)
-    plain = Song(song.grid_s, BeatGrid(song.beats.time_s, none, none, np.ones(16)), 8.3)
+    plain = PlayedSong(song.grid_s, BeatGrid(song.beats.time_s, none, none, np.ones(16)), 8.3)
     with pytest.raises(DirectionError, match="pin seconds or beats"):
         to_pin(parse_pin("bar:1=spin"), plain, nodes)
 
@@ -119,7 +120,7 @@ def test_a_way_out_can_be_typed_as_it_stands(nodes, text, shift):
     inside = grid_s[2:-2]
     number = np.arange(len(inside))
     beats = BeatGrid(inside, number // 4 + 1, number % 4 + 1, np.ones(len(inside)))
-    song = Song(grid_s, beats, float(grid_s[-1]) - 0.1)
+    song = PlayedSong(grid_s, beats, float(grid_s[-1]) - 0.1)
     wish = parse_pin(text)
     pin = to_pin(wish, song, nodes)
     typed = way_out(WayOut(0, shift, ""), [pin], [wish], song).partition(", ")[0]
@@ -137,11 +138,11 @@ def test_what_could_be_wished_instead_is_of_the_same_kind(nodes):
 
 def test_the_start_and_the_end_are_moments_one_can_see(nodes):
     beats = BeatGrid(np.arange(1, 9) * 0.5, np.zeros(8, int), np.zeros(8, int), np.ones(8))
-    song = Song(np.arange(10) * 0.5 - 0.4, beats, 4.2)
+    song = PlayedSong(np.arange(10) * 0.5 - 0.4, beats, 4.2)
     start, end = (to_pin(parse_pin(f"{place}=spin"), song, nodes) for place in ("start", "end"))
     assert (start.first, start.last) == (0, 2)  # of the first interval the song has a fifth
     assert (end.first, end.last) == (8, 9)  # of the last most of it, from 3.6 to 4.1
-    short = Song(np.arange(10) * 0.5 - 0.4, beats, 3.7)
+    short = PlayedSong(np.arange(10) * 0.5 - 0.4, beats, 3.7)
     end = to_pin(parse_pin("end=spin"), short, nodes)
     assert (end.first, end.last) == (7, 9)
 
@@ -150,7 +151,7 @@ def test_a_moment_before_the_first_beat_is_that_of_the_beat():
     """Three milliseconds before a song's first beat are no moment of their own, nor are those after its last."""
     time_s = 0.003 + np.arange(8) * 0.5
     beats = BeatGrid(time_s, np.zeros(8, int), np.zeros(8, int), np.ones(8))
-    song = Song(np.append(time_s[0] - 0.5, np.append(time_s, time_s[-1] + 0.5)), beats, float(time_s[-1]) + 0.004)
+    song = PlayedSong(np.append(time_s[0] - 0.5, np.append(time_s, time_s[-1] + 0.5)), beats, float(time_s[-1]) + 0.004)
     assert stretch(parse_pin("0=spin"), song) == (0, 2)
     assert stretch(parse_pin("0.2=spin"), song) == (1, 2)
     assert stretch(parse_pin("3.505=spin"), song) == (7, 9)
