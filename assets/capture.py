@@ -27,7 +27,7 @@ from schemas.motion import CLIP, POSE, SKELETON
     # Poses first: they are made one session at a time while they are stored, and leave the small tables behind.
     (POSE, SKELETON, CALIBRATION, CLIP),
     group="capture",
-    code_version="3",
+    code_version="4",
     settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,
