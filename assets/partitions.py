@@ -18,6 +18,7 @@ SESSION_TABLES = (
     "motion_feature",
     "motion_beat",
     "key_pose",
+    "motion_embedding",
 )
 """Tables cut by session: what is made of every clip reads all their partitions."""
 

@@ -24,6 +24,7 @@ from assets.tables import pack as tables
 from kernels.music.preview import render_preview
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Choreography, Clip
+from kernels.warp import EASY_WARP
 from schemas.choreography import CHOREOGRAPHY, USD_ANIMATION
 from schemas.keys import source_clip
 
@@ -162,7 +163,7 @@ def outside_warp(steps: Choreography) -> list[dict[str, Any]]:
             "clip_id": source_clip(steps.clip_id[i]),
             "warp_ratio": round(float(warp[i]), 4),
         }
-        for i in np.flatnonzero((warp < 0.90 - 1e-6) | (warp > 1.10 + 1e-6))
+        for i in np.flatnonzero((warp < EASY_WARP[0] - 1e-6) | (warp > EASY_WARP[1] + 1e-6))
     ]
 
 

@@ -19,6 +19,7 @@ from kernels.assembly.blend import Dance
 from kernels.assembly.quality import Measure
 from kernels.motion.velocity import kinematic_beats, mean_speed
 from kernels.types import BeatGrid, Choreography, Float
+from kernels.warp import EASY_WARP
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -264,7 +265,7 @@ def dance_timeline(dance: Dance, steps: Choreography, music_beat_s: Float) -> by
         fontsize=8,
         loc="left",
     )
-    warp.axhspan(0.90, 1.10, color="#e6f0e6")
+    warp.axhspan(*EASY_WARP, color="#e6f0e6")
     warp.step(
         np.append(steps.song_start_s, steps.song_end_s[-1:]),
         np.append(steps.warp_ratio, steps.warp_ratio[-1:]),

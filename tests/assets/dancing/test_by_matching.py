@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from assets.dancing.by_matching import ClipFeatures, match_cost, places_of
+from assets.dancing.match_pieces import ClipFeatures, match_cost, places_of
 from assets.tables.matching import StoredMatches
 from kernels.motion.features import bumps
 

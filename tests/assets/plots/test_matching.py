@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from assets.dancing.by_matching import Piece
+from assets.dancing.match_pieces import Piece
 from assets.plots import matching as mp
 from assets.tables import matching as mt
 from kernels.matching.path import Chosen
