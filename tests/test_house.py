@@ -145,8 +145,8 @@ UNDOCUMENTED = {
         "assets/tables": "hmm pack search",
         "pipelines": "build cli collection freshness io_managers jobs resources schedules sensors web",
         "pipelines/studio": "files folder lake",
-        "pipelines/commands": "asked build calibrate check dance dance_report hmm_report progress propose session status "
-        "why",
+        "pipelines/commands": "asked build calibrate check dance dance_report hmm_report progress propose session "
+        "status why",
     }.items()
     for name in names.split()
 }

@@ -222,13 +222,9 @@ def warp_measures(steps: Choreography) -> list[Measure]:
         float(warp.min()),
         float(warp.max()),
     )
+    within = f"{EASY_WARP[0]:.2f} to {EASY_WARP[1]:.2f}"
     return [
-        Measure(
-            "warp_easy_ratio",
-            easy,
-            f"at least 0.95 of steps within {EASY_WARP[0]:.2f} to {EASY_WARP[1]:.2f}",
-            easy >= 0.95,
-        ),
+        Measure("warp_easy_ratio", easy, f"at least 0.95 of steps within {within}", easy >= 0.95),
         Measure("warp_least_ratio", least, f"never below {HARD_WARP[0]:.2f}", least >= HARD_WARP[0] - _SLACK),
         Measure("warp_most_ratio", most, f"never above {HARD_WARP[1]:.2f}", most <= HARD_WARP[1] + _SLACK),
     ]

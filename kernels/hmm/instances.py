@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.hmm.durations import EASY_WARP
+
 from kernels.matching.path import viterbi
 from kernels.types import Float, Int
-from kernels.warp import stretch_price
+from kernels.warp import EASY_WARP, stretch_price
 
 HARD_COST = 4.0
 """Added where the pace is beyond the easy bounds: as much as several rough seams."""
