@@ -134,3 +134,14 @@ def test_make_refuses_other_pythons_and_names_those_it_takes(tmp_path):
     assert done.returncode != 0
     assert f"want a Python that is {PROJECT['requires-python']}, got Python 3.9.1" in done.stderr + done.stdout
     assert not (tmp_path / "venv").exists()
+
+
+def test_the_lines_for_windows_install_what_make_installs():
+    readme = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+    makefile = (REPOSITORY / "Makefile").read_text(encoding="utf-8")
+    lines = readme.partition("in PowerShell:")[2].partition("\n```\n\n")[0]
+    pinned = re.findall(r"uv==[\d.]+", makefile)
+    assert re.findall(r"uv==[\d.]+", lines) == pinned[:1]
+    for options in ("--require-hashes -r requirements.lock", "--no-build-isolation --no-deps --editable .", "-n auto"):
+        assert options in makefile
+        assert options in lines

@@ -79,32 +79,79 @@ def join(parts: Sequence[Vector] | Sequence[Quaternion]) -> Float:
 
 
 def add(a: Vector, b: Vector) -> Vector:
-    """Sum of two vectors."""
+    """Add two vectors.
+
+    Parameters
+    ----------
+    a, b : Vector
+
+    Returns
+    -------
+    Vector
+    """
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """Difference of two vectors."""
+    """Take one vector from another.
+
+    Parameters
+    ----------
+    a, b : Vector
+
+    Returns
+    -------
+    Vector
+        a - b.
+    """
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def scale(k: Float | float, v: Vector) -> Vector:
-    """Multiple of a vector."""
+    """Multiply a vector.
+
+    Parameters
+    ----------
+    k : (F,) float64, or one float for all
+    v : Vector
+
+    Returns
+    -------
+    Vector
+    """
     return k * v[0], k * v[1], k * v[2]
 
 
 def dot(a: Vector, b: Vector) -> Float:
-    """Scalar product of two vectors."""
+    """Take the scalar product of two vectors.
+
+    Parameters
+    ----------
+    a, b : Vector
+
+    Returns
+    -------
+    (F,) float64
+    """
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product of two vectors."""
+    """Take the vector product of two vectors.
+
+    Parameters
+    ----------
+    a, b : Vector
+
+    Returns
+    -------
+    Vector
+    """
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def carry(q: Quaternion, v: Constant) -> Vector:
-    """Turn a constant vector: v + w t + u x t with t = 2 u x v, where q = (w, u).
+    """Turn a constant vector: v + w t + u x t with t = 2 u x v, where q is (w, u).
 
     Parameters
     ----------

@@ -1,5 +1,6 @@
 """What the command prints on consoles of any encoding, and its version."""
 
+import io
 import json
 import os
 import subprocess
@@ -9,6 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+
+from pipelines import cli
 
 REPOSITORY = Path(__file__).parents[2]
 # What pipes of Windows are in Western Europe, and a C locale that stays one: there Python reads no file's name either.
@@ -45,39 +48,56 @@ def odd_studio(tmp_path):
     return root
 
 
-@pytest.mark.parametrize("console", CONSOLES)
-def test_json_is_utf8_on_every_console(odd_studio, console):
+@pytest.mark.parametrize("console", ["C locale", KEPT, "cp1252"])
+def test_json_is_utf8_and_no_sign_ends_a_report(odd_studio, console):
     done = odori(console, "status", "--json", "--studio", odd_studio)
     facts = json.loads(done.stdout.decode("utf-8"))
     assert done.stdout.count(b"\n") == 1
     assert done.returncode == 1
     assert len(facts["clips"]) == 1
+    report = odori(console, "status", "--studio", odd_studio)
+    assert report.returncode == 1
+    assert b"Traceback" not in report.stderr
     if console != KEPT:
         assert facts["clips"][0]["path"] == "clips/歌 Été.xyz"
         assert "歌 Été".encode() in done.stdout
+        assert ("歌".encode() if console == "C locale" else rb"\u6b4c") in report.stdout
 
 
 @pytest.mark.parametrize("console", CONSOLES)
-def test_no_sign_ends_a_report(odd_studio, console):
-    done = odori(console, "status", "--studio", odd_studio)
-    assert done.returncode == 1
-    assert b"Traceback" not in done.stderr
-    codec = "ascii" if console == KEPT else CONSOLES[console].get("PYTHONIOENCODING", "utf-8")
-    text = done.stdout.decode(codec)
-    if console != KEPT:
-        assert ("歌" in text) if codec.startswith("utf") else (r"\u6b4c" in text)
-
-
-@pytest.mark.parametrize("console", CONSOLES)
-def test_no_sign_ends_an_error_or_a_page_of_help(tmp_path, console):
-    done = odori(console, "status", "--json", "--studio", tmp_path / "踊り")
-    assert done.returncode == 2
-    error = json.loads(done.stdout.decode("utf-8"))["error"]
-    assert "want a studio folder" in error
-    assert "踊り" in error or console == KEPT
-    assert b"Traceback" not in done.stderr
+def test_no_sign_ends_a_page_of_help(console):
     done = odori(console, "dance", "--help")
     assert done.returncode == 0
+    assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "cp932", "utf-16", "utf-8"])
+def test_every_encoding_of_a_pipe(encoding, monkeypatch):
+    """An answer, a report and a complaint, with signs of three bytes, of four, and none of any encoding."""
+    text = "歌 Été 🕺 \udce9"
+    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding=encoding) for name in ("stdout", "stderr")}
+    for name, stream in streams.items():
+        monkeypatch.setattr(sys, name, stream)
+    monkeypatch.setattr(cli, "_answered", [])
+    cli._settle_streams()
+    cli.TROUBLE.print(text)
+    cli._say(text, False)
+    streams["stdout"].flush()
+    said = streams["stdout"].buffer.getvalue()
+    cli._answer({"path": text})
+    for stream in streams.values():
+        stream.flush()
+    assert r"\udce9" in streams["stderr"].buffer.getvalue().decode(encoding)
+    assert ("歌" in said.decode(encoding)) == (encoding in ("cp932", "utf-16", "utf-8"))
+    answer = streams["stdout"].buffer.getvalue()[len(said) :]
+    assert json.loads(answer.decode("utf-8")) == {"path": text}
+
+
+@pytest.mark.parametrize("console", [KEPT, "cp1252"])
+def test_no_sign_ends_an_error(tmp_path, console):
+    done = odori(console, "calibrate", tmp_path / "踊り.csv", "--json")
+    assert done.returncode == 2
+    assert "踊り" in json.loads(done.stdout.decode("utf-8"))["error"] or console == KEPT
     assert b"Traceback" not in done.stderr
 
 
