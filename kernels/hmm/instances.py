@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-
 from kernels.matching.path import viterbi
 from kernels.types import Float, Int
 from kernels.warp import EASY_WARP, stretch_price

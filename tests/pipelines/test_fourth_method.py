@@ -50,7 +50,12 @@ def test_a_fourth_method_is_one_file_and_one_line(built, tmp_path):
     environment = os.environ | {"PYTHONPATH": str(code)}
     ask = ASK.replace("sys.argv[1]", "__import__('pathlib').Path(sys.argv[1])")
     done = subprocess.run(
-        [sys.executable, "-c", ask, str(studio)], capture_output=True, text=True, check=False, env=environment
+        [sys.executable, "-c", ask, str(studio)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+        cwd=tmp_path,
     )
     assert done.stdout.startswith("0 toy"), done.stdout + done.stderr[-3000:]
     assert (Path(studio) / "lake" / "choreography" / "beat|toy.parquet").is_file()
