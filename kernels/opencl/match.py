@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from kernels.matching.catalogue import Catalogue, Chunk, Series, Song, check_search, portions
 from kernels.matching.plan import PLANS, Plan, bytes_a_frame
 from kernels.matching.score import (
     SCALES,
     Match,
-    check_query,
-    check_series,
     merge_matches,
-    music_sum,
     numerators,
-    ranked,
     ratios,
-    reference_matches,
-    start_count,
     sums_of_candidates,
 )
 from kernels.opencl.choice import pick_device
@@ -32,66 +26,25 @@ from kernels.opencl.match_tables import Tables
 from kernels.opencl.match_tuning import pick_plan
 
 MEMORY_BYTES = 2**31
-_LONGEST = 2**23
 _CANDIDATES = 2**14
 
-Series = NDArray[np.floating]
 
-
-class ClipIndex:
+class ClipIndex(Catalogue[Tables]):
     """A catalogue prepared for many songs; made by :meth:`Matcher.index`.
 
     Holds the clips in host memory, and their tables in device memory where the matcher's budget allows.
+
+    Parameters
+    ----------
+    chunks : sequence of Chunk
+    fiftieths : the scales times 50
+    is_resident : bool, whether tables stay on the device between searches
     """
-
-    def __init__(self, chunks: Sequence[Chunk], *, fiftieths: tuple[int, ...], is_resident: bool) -> None:
-        self.chunks = tuple(chunks)
-        self.fiftieths = fiftieths
-        self.is_resident = is_resident
-
-    def __len__(self) -> int:
-        return sum(len(chunk.clips) for chunk in self.chunks)
 
     @property
     def device_bytes(self) -> int:
         """Device memory held between searches."""
         return sum(chunk.tables.n_bytes for chunk in self.chunks if chunk.tables is not None)
-
-
-class Chunk:
-    """Neighbouring clips of a catalogue that are searched together.
-
-    Parameters
-    ----------
-    first : int, index in the catalogue of the first
-    clips : sequence of (T,) float
-    """
-
-    def __init__(self, first: int, clips: Sequence[Series]) -> None:
-        self.first = first
-        self.clips = tuple(clips)
-        self.tables: Tables | None = None
-        silent = [not clip.any() for clip in self.clips]
-        self.live = np.flatnonzero(~np.array(silent, bool))
-        self.silent = np.flatnonzero(silent)
-        self._flat: tuple[NDArray[np.float64], NDArray[np.int64]] | None = None
-
-    def sounding(self) -> list[Series]:
-        """Clips that are not silent throughout: those the device sees."""
-        return [self.clips[index] for index in self.live]
-
-    def flat(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """All sounding clips one after another, and where each begins."""
-        if self._flat is None:
-            clips = self.sounding()
-            starts = np.cumsum([0, *(len(clip) for clip in clips)])[:-1]
-            self._flat = np.concatenate(clips).astype(np.float64), starts.astype(np.int64)
-        return self._flat
-
-    def halves(self) -> tuple[Chunk, Chunk]:
-        """Split, with nothing of it on the device."""
-        half = len(self.clips) // 2
-        return Chunk(self.first, self.clips[:half]), Chunk(self.first + half, self.clips[half:])
 
 
 class Matcher:
@@ -203,16 +156,11 @@ class Matcher:
         """
         fiftieths = numerators(scales)
         segments = [np.asarray(segment) for segment in segments]
-        check_query(segments, k=k)
-        if floors is not None and len(floors) != len(segments):
-            raise ValueError(f"floors: want one a segment, {len(segments)}, got {len(floors)}")
-        if isinstance(clips, ClipIndex) and clips.fiftieths != fiftieths:
-            raise ValueError(f"clips: want an index for the scales {tuple(scales)}, got one for others; make it anew")
+        given = check_search(segments, clips, k=k, fiftieths=fiftieths, floors=floors)
         found: list[list[Match]] = [[] for _ in segments]
         if not segments:
             return found
-        song = _Song(segments, k=k, fiftieths=fiftieths)
-        given = np.full(len(segments), -1.0) if floors is None else np.asarray(floors, np.float64)
+        song = Song(segments, k=k, fiftieths=fiftieths)
         chunks = (
             clips.chunks if isinstance(clips, ClipIndex) else self._chunks(clips, fiftieths, n_segments=len(segments))
         )
@@ -224,34 +172,23 @@ class Matcher:
             found = merge_matches([found, part], k=k)
         return found
 
-    def _chunks(self, clips: Iterable[Series], fiftieths: tuple[int, ...], *, n_segments: int) -> Iterator[Chunk]:
+    def _chunks(
+        self, clips: Iterable[Series], fiftieths: tuple[int, ...], *, n_segments: int
+    ) -> Iterator[Chunk[Tables]]:
         """Cut a catalogue into chunks whose tables fit, for the plan that needs most."""
         plans = [self.plan] if self.plan else list(PLANS)
         a_frame = max(bytes_a_frame(plan, fiftieths) for plan in plans)
         most = min(self.memory_bytes, 2**31 * 4)
         # one table is one buffer, and a buffer has a limit of its own
         frames_most = min(self.program.device.max_mem_alloc_size // a_frame, 2**30)
-        waiting: list[Series] = []
-        first, n_bytes, n_frames = 0, 0, 0
-        for index, clip in enumerate(clips):
-            clip = np.asarray(clip)
-            try:
-                check_series([clip], "clip")
-            except ValueError as error:
-                raise ValueError(str(error).replace("clip 0", f"clip {index}", 1)) from None
-            if len(clip) > _LONGEST:
-                raise ValueError(f"clip {index}: want at most {_LONGEST} frames, got {len(clip)}; cut it")
-            stride = len(clip) + 24
-            if waiting and (n_bytes + stride * a_frame + 8 * n_segments > most or n_frames + stride > frames_most):
-                yield Chunk(first, waiting)
-                first, waiting, n_bytes, n_frames = index, [], 0, 0
-            waiting.append(clip)
-            n_bytes += stride * a_frame + 8 * n_segments
-            n_frames += stride
-        if waiting:
-            yield Chunk(first, waiting)
+        for first, some in portions(
+            clips, bytes_a_frame=a_frame, bytes_a_clip=8 * n_segments, most_bytes=most, most_frames=frames_most
+        ):
+            yield Chunk(first, some)
 
-    def _search(self, song: _Song, chunk: Chunk, floor: NDArray[np.float64], *, is_kept: bool) -> list[list[Match]]:
+    def _search(
+        self, song: Song, chunk: Chunk[Tables], floor: NDArray[np.float64], *, is_kept: bool
+    ) -> list[list[Match]]:
         """Search one chunk; if the device's memory does not suffice, its halves."""
         try:
             found = self._search_device(song, chunk, floor, is_kept=is_kept)
@@ -264,14 +201,10 @@ class Matcher:
                 ) from error
             parts = [self._search(song, half, floor, is_kept=False) for half in chunk.halves()]
             return merge_matches(parts, k=song.k)
-        for index in range(len(song.segments)):
-            silent = range(len(chunk.clips)) if song.is_silent[index] else chunk.silent.tolist()
-            if silent and floor[index] <= 0:
-                found[index] += song.silences(index, chunk, silent)
-        return [ranked(matches, k=song.k) for matches in found]
+        return song.with_silences(found, chunk, floor=floor)
 
     def _search_device(
-        self, song: _Song, chunk: Chunk, floor: NDArray[np.float64], *, is_kept: bool
+        self, song: Song, chunk: Chunk[Tables], floor: NDArray[np.float64], *, is_kept: bool
     ) -> list[list[Match]]:
         """Find the matches of segments and clips that are not silent."""
         found: list[list[Match]] = [[] for _ in song.segments]
@@ -308,20 +241,15 @@ class Matcher:
             self._finish(song, chunk, stages, chosen, floor, found)
         for index, kind in enumerate(kinds):
             if kind == (None,):
-                scales = [p / 50 for p in song.fiftieths]
-                matches, *_ = reference_matches([song.segments[index]], chunk.sounding(), k=song.k, scales=scales)
-                found[index] = [
-                    replace(m, segment_index=index, clip_index=int(chunk.live[m.clip_index]) + chunk.first)
-                    for m in matches
-                ]
+                found[index] = song.by_reference(index, chunk)
         if is_kept:
             chunk.tables = tables
         return found
 
     def _finish(
         self,
-        song: _Song,
-        chunk: Chunk,
+        song: Song,
+        chunk: Chunk[Tables],
         stages: Stages,
         chosen: NDArray[np.int64],
         floor: NDArray[np.float64],
@@ -365,28 +293,3 @@ class Matcher:
                         *ratios(float(scores[i]), song.music_sum[index], float(motion[i])),
                     )
                 )
-
-
-class _Song:
-    """Segments laid out once for all chunks."""
-
-    def __init__(self, segments: list[Series], *, k: int, fiftieths: tuple[int, ...]) -> None:
-        self.segments, self.k, self.fiftieths = segments, k, fiftieths
-        self.n_frames = np.array([len(segment) for segment in segments], np.int64)
-        self.order = np.argsort(self.n_frames, kind="stable")
-        self.padded = np.zeros((len(segments), int(self.n_frames.max())))
-        for index, segment in enumerate(segments):
-            self.padded[index, : len(segment)] = segment
-        self.top = self.padded.max(1)
-        self.is_silent = self.top == 0
-        self.music_sum = [music_sum(segment) for segment in segments]
-
-    def silences(self, index: int, chunk: Chunk, clips: Iterable[int]) -> list[Match]:
-        """List the first k of some clips that a segment fits into, where all scores are 0."""
-        matches: list[Match] = []
-        for clip in clips:
-            if start_count(len(self.segments[index]), len(chunk.clips[clip]), self.fiftieths[0]):
-                matches.append(Match(index, 0, clip + chunk.first, 0, 0, 0.0, 0.0, 0.0))
-                if len(matches) == self.k:
-                    break
-        return matches

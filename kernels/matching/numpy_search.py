@@ -1,0 +1,218 @@
+"""The k best clips of every segment in NumPy, pruned: twin of the search on OpenCL, for machines without a device.
+
+The answer is that of :func:`kernels.matching.score.reference_matches`, to the bit: same clips, scales, starts and
+scores. Upper bounds of all candidates are matrix products (:mod:`kernels.matching.bounds`), what may be among the best
+is scored in float64 (:mod:`kernels.matching.candidates`), and the best of each pair in the reference's order
+(:mod:`kernels.matching.refinement`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from kernels.matching.blocks import rows
+from kernels.matching.bounds import SumTables
+from kernels.matching.catalogue import Catalogue, Chunk, Series, Song, check_search, portions
+from kernels.matching.refinement import PLACE_BITS, Refinement
+from kernels.matching.score import SCALES, Match, merge_matches, numerators, ratios, sums_of_candidates
+
+MEMORY_BYTES = 2**31
+_MOST_FRAMES = 2**30
+_TOGETHER = 512  # segments of one search
+_LONGER = 1.15  # times the shortest: the longest segment of one search
+_SPARSE = 0.25  # share of frames with music
+# largest values for which products neither overflow nor lose what a score is made of
+_SIZES = (2.0**-400, 2.0**400)
+
+
+class NumpyMatcher:
+    """The pruned search without a device.
+
+    Parameters
+    ----------
+    memory_bytes : int
+        Memory for clips, their block sums, and bounds of pairs; more clips are taken chunk by chunk.
+
+    Raises
+    ------
+    ValueError
+        If the memory is not > 0.
+    """
+
+    def __init__(self, *, memory_bytes: int = MEMORY_BYTES) -> None:
+        if memory_bytes <= 0:
+            raise ValueError(f"memory_bytes: want > 0, got {memory_bytes}")
+        self.memory_bytes = memory_bytes
+
+    @property
+    def name(self) -> str:
+        """What computes, for metadata."""
+        return "reference"
+
+    def index(self, clips: Iterable[Series], *, scales: Sequence[float] = SCALES) -> Catalogue[SumTables]:
+        """Prepare a catalogue for many songs.
+
+        Parameters
+        ----------
+        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys
+        scales : rising multiples of 1/50
+
+        Returns
+        -------
+        Catalogue
+            Its block sums are made by the first search and kept if all fit into the memory allowed; else they are
+            made anew, chunk by chunk, by every search.
+
+        Raises
+        ------
+        ValueError
+            If a clip is not (F,), not finite or negative; or the scales are not as wanted.
+        """
+        fiftieths = numerators(scales)
+        chunks = list(self._chunks(clips, fiftieths, n_segments=0))
+        return Catalogue(chunks, fiftieths=fiftieths, is_resident=len(chunks) <= 1)
+
+    def matches(
+        self,
+        segments: Sequence[Series],
+        clips: Iterable[Series] | Catalogue[SumTables],
+        *,
+        k: int,
+        scales: Sequence[float] = SCALES,
+        floors: Sequence[float] | None = None,
+    ) -> list[list[Match]]:
+        """Find the k best clips of every segment.
+
+        Parameters
+        ----------
+        segments : sequence of (L,) float, L >= 1, finite, >= 0
+        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys; or their index
+            An iterable is read once, a chunk at a time.
+        k : int, >= 1
+        scales : rising multiples of 1/50
+        floors : sequence of S float, or None
+            Scores that k clips elsewhere are known to reach, as when many workers share a song: worse ones may be left
+            out here. What :func:`kernels.matching.score.merge_matches` makes of all parts stays the same.
+
+        Returns
+        -------
+        list, one a segment, of lists of Match
+            As :func:`kernels.matching.score.reference_matches`, to the bit.
+
+        Raises
+        ------
+        ValueError
+            As the reference; or if an index was made for other scales, or there is not one floor a segment.
+        """
+        fiftieths = numerators(scales)
+        segments = [np.asarray(segment) for segment in segments]
+        given = check_search(segments, clips, k=k, fiftieths=fiftieths, floors=floors)
+        found: list[list[Match]] = [[] for _ in segments]
+        if not segments:
+            return found
+        song = Song(segments, k=k, fiftieths=fiftieths)
+        is_kept = isinstance(clips, Catalogue) and clips.is_resident
+        chunks = (
+            clips.chunks if isinstance(clips, Catalogue) else self._chunks(clips, fiftieths, n_segments=len(segments))
+        )
+        # products are small: a second thread would mostly wait
+        with threadpool_limits(limits=1, user_api="blas"):
+            for chunk in chunks:
+                reached = [matches[-1].score if len(matches) == k else -1.0 for matches in found]
+                floor = np.maximum(given, reached)
+                part = self._search(song, chunk, floor, is_kept=is_kept)
+                found = merge_matches([found, song.with_silences(part, chunk, floor=floor)], k=k)
+        return found
+
+    def _chunks(
+        self, clips: Iterable[Series], fiftieths: tuple[int, ...], *, n_segments: int
+    ) -> Iterator[Chunk[SumTables]]:
+        """Cut a catalogue into chunks that fit with their block sums."""
+        n_rows = sum(len(rows(block, fiftieths)) for block in (25, 10, 10, 5))
+        for first, some in portions(
+            clips,
+            bytes_a_frame=2 * n_rows + 12,
+            bytes_a_clip=40 * n_segments,
+            most_bytes=self.memory_bytes,
+            most_frames=_MOST_FRAMES,
+        ):
+            yield Chunk(first, some)
+
+    def _search(
+        self, song: Song, chunk: Chunk[SumTables], floor: NDArray[np.float64], *, is_kept: bool
+    ) -> list[list[Match]]:
+        """Find the matches of segments and clips that are not silent."""
+        found: list[list[Match]] = [[] for _ in song.segments]
+        if not len(chunk.live) or song.is_silent.all():
+            return found
+        clips = chunk.sounding()
+        loudest = max(float(clip.max()) for clip in clips)
+        is_plain = (song.top >= _SIZES[0]) & (song.top <= _SIZES[1]) & (_SIZES[0] <= loudest <= _SIZES[1])
+        if is_plain.any():
+            tables = chunk.tables or SumTables(clips, numerators=song.fiftieths)
+            for alike in _alike(song, np.flatnonzero(is_plain)):
+                self._search_alike(song, chunk, tables, alike, floor, found)
+            if is_kept:
+                chunk.tables = tables
+        for index in np.flatnonzero(~is_plain & ~song.is_silent).tolist():
+            found[index] = song.by_reference(index, chunk)
+        return found
+
+    def _search_alike(
+        self,
+        song: Song,
+        chunk: Chunk[SumTables],
+        tables: SumTables,
+        chosen: NDArray[np.int64],
+        floor: NDArray[np.float64],
+        found: list[list[Match]],
+    ) -> None:
+        """Find the matches of segments that are alike."""
+        n_frames = song.n_frames[chosen]
+        best = Refinement(
+            tables,
+            chunk.sounding(),
+            song.padded[chosen, : int(n_frames.max())],
+            n_frames=n_frames,
+            k=song.k,
+            floor=floor[chosen],
+        ).search()
+        order = np.argsort(-best.score, axis=1, kind="stable")[:, : song.k]
+        score = np.take_along_axis(best.score, order, 1)
+        row, rank = np.nonzero(score >= 0)
+        clip = order[row, rank]
+        scale, start = np.divmod(best.place[row, clip], 1 << PLACE_BITS)
+        frames, first = chunk.flat()
+        scores, motion = sums_of_candidates(
+            song.padded,
+            frames,
+            n_frames=song.n_frames,
+            segment=chosen[row],
+            first=first[clip] + start,
+            numerator=np.array(song.fiftieths, np.int64)[scale],
+        )
+        for i, (c, b_sum) in enumerate(zip(scores.tolist(), motion.tolist(), strict=True)):
+            index = int(chosen[row[i]])
+            place = (int(chunk.live[clip[i]]) + chunk.first, int(scale[i]), int(start[i]))
+            found[index].append(Match(index, 0, *place, c, *ratios(c, song.music_sum[index], b_sum)))
+
+
+def _alike(song: Song, chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+    """Put together segments of like loudness, density and length, the shorter first."""
+    n_frames = song.n_frames[chosen]
+    loudness = np.frexp(song.top[chosen])[1] // 4
+    is_sparse = np.count_nonzero(song.padded[chosen], axis=1) < _SPARSE * n_frames
+    order = np.lexsort((n_frames, loudness, is_sparse))
+    first = 0
+    for index in range(1, len(order) + 1):
+        if index < len(order):
+            here, there = order[first], order[index]
+            is_alike = loudness[here] == loudness[there] and is_sparse[here] == is_sparse[there]
+            if is_alike and n_frames[there] <= _LONGER * n_frames[here] + 1 and index - first < _TOGETHER:
+                continue
+        yield chosen[order[first:index]]
+        first = index
