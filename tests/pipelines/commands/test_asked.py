@@ -17,7 +17,7 @@ def test_a_song_is_found_by_key_name_or_path(folder, text):
 
 
 def test_a_song_that_is_not_there_is_an_error_that_names_the_nearest(folder):
-    with pytest.raises(StudioError, match="beet: want a song of this studio, .* near are beat"):
+    with pytest.raises(StudioError, match=r"beet: want a song of this studio, .* near are beat"):
         wanted_songs(freshness(folder), ["beet"], folder)
 
 
