@@ -9,19 +9,28 @@ BLENDER := .venv-blender
 help: ## what can be made
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 14
 
+# The Pythons that pyproject.toml allows, read from it: there they are said once.
+ALLOWED := import re, sys; \
+  said = re.search(r"requires-python = \">=3.(\d+),<3.(\d+)\"", open("pyproject.toml").read()).groups(); \
+  sys.exit(not (3, int(said[0])) <= sys.version_info[:2] < (3, int(said[1])))
+
 $(STAMP): requirements.lock pyproject.toml
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 13))' || \
-	  { echo "odori: want Python 3.11 or 3.12, got $$($(PYTHON) --version 2>&1); name one with 'make PYTHON=python3.11'"; exit 2; }
+	@$(PYTHON) -c '$(ALLOWED)' || { echo "odori: want a Python that is $$(sed -n 's/^requires-python = "\(.*\)".*/\1/p' \
+	  pyproject.toml), got $$($(PYTHON) --version 2>&1); name one with 'make PYTHON=python3.11'"; exit 2; }
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv==0.13.9
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --compile-bytecode --require-hashes -r requirements.lock
-	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --no-deps --editable .
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --quiet --no-build-isolation --no-deps --editable .
 	@touch $(STAMP)
 
 install: $(STAMP) ## .venv with odori, ruff, lint-imports, pytest in it
 
 demo: $(STAMP) ## a made-up studio, the whole pipeline, one dance
 	@$(BIN)/odori demo
+
+wheel: $(STAMP) ## dist/odori-*.whl, which needs no checkout
+	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv build --quiet --wheel --no-build-isolation --out-dir dist
+	@ls dist/odori-*.whl
 
 test: $(STAMP) ## the tests
 	@$(BIN)/python -m pytest -n auto --dist loadfile
@@ -53,4 +62,4 @@ lock: $(STAMP) ## resolve the dependencies anew
 	@echo 'bpy==4.5.*' | $(BIN)/uv pip compile - --quiet --python-version 3.11 --python-platform x86_64-manylinux_2_28 \
 	  --generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links --no-header -o requirements-blender.lock
 
-.PHONY: help install demo test lint docs blender lock
+.PHONY: help install demo wheel test lint docs blender lock

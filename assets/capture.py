@@ -6,24 +6,16 @@ from dataclasses import dataclass
 import dagster as dg
 import pyarrow as pa
 
-from assets import calibration_plots, tables
-from assets.calibration import CalibrationError, Solvers, calibrate_file, up_axis
-from assets.calibration_table import from_calibration
-from assets.declare import table_assets
+from assets.declare import code_version, table_assets
 from assets.formats import bvh
 from assets.formats.errors import FormatError
-from assets.lineage import (
-    ClipStamp,
-    Earlier,
-    Part,
-    Parts,
-    Progress,
-    code_version,
-    content_version,
-    version_of,
-)
 from assets.partitions import SESSION, lake_key
-from assets.sources import Clip, Studio, session_version
+from assets.plots import calibration as calibration_plots
+from assets.sources.calibration import CalibrationError, Solvers, calibrate_file, up_axis
+from assets.sources.sources import Clip, Studio, session_version
+from assets.stamps import ClipStamp, Earlier, Part, Parts, Progress, content_version, version_of
+from assets.tables import pack as tables
+from assets.tables.calibration import from_calibration
 from kernels.skeleton.naming import map_joints
 from kernels.types import Clip as Motion
 from schemas.calibration import CALIBRATION
@@ -35,7 +27,7 @@ from schemas.motion import CLIP, POSE, SKELETON
     # Poses first: they are made one session at a time while they are stored, and leave the small tables behind.
     (POSE, SKELETON, CALIBRATION, CLIP),
     group="capture",
-    code_version="3",
+    code_version="4",
     settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,

@@ -8,11 +8,13 @@ import numpy as np
 import polars as pl
 import pyarrow as pa
 
-from assets import matching_tables, plots, tables
 from assets.declare import table_asset, table_assets
-from assets.lineage import Part, Progress, Stored
 from assets.partitions import DANCE, EVERY, lake_key
-from assets.sources import Studio, request_of, request_version
+from assets.plots import draw as plots
+from assets.sources.sources import Studio, request_of, request_version
+from assets.stamps import Part, Progress, Stored
+from assets.tables import matching as matching_tables
+from assets.tables import pack as tables
 from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet

@@ -1,11 +1,15 @@
 """Assets that store declared tables: name, meaning, columns and versions said once, for every asset alike."""
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import dagster as dg
 
+from assets.dancing.danced import Markdown
+from assets.dancing.method import Method
+from assets.dancing.refusal import RefusalError
 from schemas.table import Table
 
 # Backfill policies are beta in the Dagster this is pinned to; its warning would stand in front of every command.
@@ -29,7 +33,7 @@ def table_asset(
     partitions: dg.PartitionsDefinition[str] | None = None,
     ins: Mapping[str, dg.AssetIn] | None = None,
     checks: Mapping[str, str] | None = None,
-    methods: Mapping[str, str] | None = None,
+    methods: Mapping[str, Method] | None = None,
     only_for: str = "",
     io_manager: str = "lake",
     keeps: bool = False,
@@ -46,8 +50,8 @@ def table_asset(
     partitions : how it is cut; many sessions or songs are made in one run
     ins : inputs whose partitions do not match its own
     checks : asset checks it yields, by name, each with what it believes
-    methods : of a dance, the methods (joined by commas) that need an input or a section of settings (``[section]``), by
-        its name; all where nothing is said
+    methods : of a dance, the methods it is chosen by: each says which of the inputs and settings it reads, and has a
+        version of its own in place of `code_version`
     only_for : the one method of dancing it is made for; made where that is used, see ``pipelines/freshness.py``
     io_manager : who stores it
     keeps : once made it stays when its inputs change; only its code, its settings or a person make it anew
@@ -119,17 +123,20 @@ def _metadata(
     settings: str,
     sources: str,
     only_for: str = "",
-    methods: Mapping[str, str] | None = None,
+    methods: Mapping[str, Method] | None = None,
     *,
     keeps: bool = False,
 ) -> dict[str, Any]:
-    said = {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
+    said: dict[str, Any] = {"dagster/column_schema": column_schema(table), SETTINGS_KEY: settings, SOURCES_KEY: sources}
     if only_for:
         said[ONLY_FOR_KEY] = only_for
     if keeps:
         said[KEEPS_KEY] = "true"
     if methods:
-        said[METHODS_KEY] = " ".join(f"{name}={method}" for name, method in methods.items())
+        said[METHODS_KEY] = {
+            name: {"version": method.version, "inputs": list(method.inputs), "settings": list(method.settings)}
+            for name, method in methods.items()
+        }
     return said
 
 
@@ -146,3 +153,55 @@ def column_schema(table: Table) -> dg.TableSchema:
         constraints = dg.TableColumnConstraints(nullable=column.is_optional, unique=table.key == (column.name,))
         columns.append(dg.TableColumn(column.name, str(column.type), meaning, constraints))
     return dg.TableSchema(columns)
+
+
+def code_version(context: dg.AssetExecutionContext, asset: str) -> str:
+    """Read the code version of an asset of this run.
+
+    Parameters
+    ----------
+    context : of the step
+    asset : name of one of the assets it makes
+
+    Returns
+    -------
+    str
+        Empty where the asset declares none.
+
+    Raises
+    ------
+    KeyError
+        If the step makes no such asset.
+    """
+    return context.assets_def.code_versions_by_key[dg.AssetKey(asset)] or ""
+
+
+@contextmanager
+def refusals_fail() -> Iterator[None]:
+    """Turn a refusal into a failure of the run: its sentence for a person, its facts for a machine.
+
+    Raises
+    ------
+    dagster.Failure
+        In place of a :class:`assets.dancing.refusal.RefusalError`; it is not tried again.
+    """
+    try:
+        yield
+    except RefusalError as refused:
+        raise dg.Failure(refused.sentence, metadata=shown(refused.facts), allow_retries=False) from refused
+
+
+def shown(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Make metadata of plain values ready for Dagster's pages.
+
+    Parameters
+    ----------
+    metadata : numbers, texts, Markdown, and lists and mappings of these
+    """
+    return {name: _shown(value) for name, value in metadata.items()}
+
+
+def _shown(value: Any) -> Any:  # noqa: ANN401 - metadata are of many types
+    if isinstance(value, Markdown):
+        return dg.MetadataValue.md(value)
+    return dg.MetadataValue.json(value) if isinstance(value, list | tuple | dict) else value

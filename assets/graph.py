@@ -8,12 +8,13 @@ import numpy as np
 import polars as pl
 import pyarrow as pa
 
-from assets import plots, tables
 from assets.declare import table_assets
 from assets.graph_memory import Beats, Memory, keep, near_pairs, recall
-from assets.lineage import Part, Progress, Stored, version_of
 from assets.partitions import EVERY
-from assets.sources import Studio
+from assets.plots import draw as plots
+from assets.sources.sources import Studio
+from assets.stamps import Part, Progress, Stored, version_of
+from assets.tables import pack as tables
 from kernels import rotation
 from kernels.graph.distance import PairDistance
 from kernels.graph.features import BeatFeatures, beat_features

@@ -6,15 +6,18 @@ import dagster as dg
 import numpy as np
 import pyarrow as pa
 
-from assets import hmm_plots, hmm_tables, performances, tables
 from assets.declare import table_asset, table_assets
-from assets.hearing import SYMBOLS, hear
-from assets.hmm_tables import ClipMotions
-from assets.lineage import Part, Progress, Stored, repeatable
-from assets.motions import cut
 from assets.partitions import EVERY
-from assets.performances import Performance
-from assets.sources import Studio
+from assets.plots import hmm as hmm_plots
+from assets.reading.hearing import SYMBOLS, hear
+from assets.reading.motions import cut
+from assets.sources import performances
+from assets.sources.performances import Performance
+from assets.sources.sources import Studio
+from assets.stamps import Part, Progress, Stored, repeatable
+from assets.tables import hmm as hmm_tables
+from assets.tables import pack as tables
+from assets.tables.hmm import ClipMotions
 from kernels.hmm import evidence as evidence_of
 from kernels.hmm import states
 from kernels.hmm.model import Performed, Smoothing, choose_smoothing, learn

@@ -7,19 +7,20 @@ import dagster as dg
 import numpy as np
 from numpy.typing import NDArray
 
-from assets import matching_plots, matching_tables
 from assets.declare import table_asset
-from assets.lineage import Part, Parts, Progress, Stored
-from assets.matching_tables import Rhythm, StoredMatches
 from assets.partitions import EVERY, SONG, lake_key
-from assets.sources import Studio
+from assets.plots import matching as matching_plots
+from assets.sources.sources import Studio
+from assets.stamps import Part, Parts, Progress, Stored
+from assets.tables import matching as matching_tables
+from assets.tables.matching import Rhythm, StoredMatches
 from kernels.matching.score import Match
 from kernels.music.segments import Segments
 from schemas.matching import MATCH
 
 
 class SegmentMatcher(Protocol):
-    """Finds the best clips of segments; see :class:`kernels.matching.search.Matcher`."""
+    """Finds the best clips of segments; see :class:`kernels.opencl.match.Matcher`."""
 
     def index(self, clips: Sequence[NDArray[Any]]) -> Any:  # noqa: ANN401 - what only the matcher itself reads
         """Prepare a catalogue for many songs.

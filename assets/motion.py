@@ -6,29 +6,23 @@ from dataclasses import replace
 import dagster as dg
 import pyarrow as pa
 
-from assets import hmm_tables, matching_plots, matching_tables, plots, tables
-from assets.declare import table_asset
-from assets.lineage import (
-    Earlier,
-    Part,
-    Parts,
-    Progress,
-    Stored,
-    clip_versions,
-    code_version,
-    per_clip,
-    version_of,
-)
-from assets.motions import cut
+from assets.declare import code_version, table_asset
 from assets.partitions import SESSION
-from assets.sources import Studio
+from assets.plots import draw as plots
+from assets.plots import matching as matching_plots
+from assets.reading.motions import cut
+from assets.sources.sources import Studio
+from assets.stamps import Earlier, Part, Parts, Progress, Stored, clip_versions, per_clip, version_of
+from assets.tables import hmm as hmm_tables
+from assets.tables import matching as matching_tables
+from assets.tables import pack as tables
 from kernels import rotation
 from kernels.hmm.states import assign
 from kernels.motion.beats import BeatSettings, motion_beats
-from kernels.motion.contacts import foot_contacts
 from kernels.motion.features import contacts_at_feature_rate, motion_features
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
+from kernels.skeleton.contacts import foot_contacts
 from kernels.skeleton.retarget import retarget
 from schemas.hmm import BASIC_MOTION, KEY_POSE
 from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE

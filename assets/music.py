@@ -6,13 +6,16 @@ from dataclasses import dataclass, replace
 import dagster as dg
 import numpy as np
 
-from assets import matching_plots, matching_tables, plots, tables
 from assets.declare import table_assets
 from assets.formats import audio, beats_file, midi
 from assets.formats.errors import FormatError
-from assets.lineage import Part, Parts, Progress, Stored, repeatable, version_of
 from assets.partitions import SONG, lake_key
-from assets.sources import Song, Studio, brief_version, song_version
+from assets.plots import draw as plots
+from assets.plots import matching as matching_plots
+from assets.sources.sources import Song, Studio, brief_version, song_version
+from assets.stamps import Part, Parts, Progress, Stored, repeatable, version_of
+from assets.tables import matching as matching_tables
+from assets.tables import pack as tables
 from kernels.assembly.timing import cover
 from kernels.music.beats import BeatAnalysis, TempoCandidate, track_beats
 from kernels.music.features import music_features

@@ -2,17 +2,25 @@
 
 import dagster as dg
 
-from schemas import settings
+from assets.dancing.methods import ALTERNATIVES, METHODS
 
 SESSION = dg.DynamicPartitionsDefinition(name="session")
 SONG = dg.DynamicPartitionsDefinition(name="song")
-METHODS = settings.METHODS
-MOST_ALTERNATIVES = 5
-ALTERNATIVES = tuple(f"graph_{number}" for number in range(2, MOST_ALTERNATIVES + 1))
-"""The graph method's second to fifth dance of a song, each unlike those before it."""
 METHOD = dg.StaticPartitionsDefinition([*METHODS, *ALTERNATIVES])
 DANCE = dg.MultiPartitionsDefinition({"song": SONG, "method": METHOD})
 EVERY = dg.AllPartitionMapping()
+SESSION_TABLES = (
+    "clip",
+    "skeleton",
+    "pose",
+    "calibration",
+    "canonical_pose",
+    "motion_feature",
+    "motion_beat",
+    "key_pose",
+    "motion_embedding",
+)
+"""Tables cut by session: what is made of every clip reads all their partitions."""
 
 
 def dance_key(song: str, method: str) -> str:
@@ -24,16 +32,6 @@ def dance_key(song: str, method: str) -> str:
     method : of :data:`METHOD`
     """
     return str(dg.MultiPartitionKey({"song": song, "method": method}))
-
-
-def base_method(method: str) -> str:
-    """Find the method an alternative is one of."""
-    return method.partition("_")[0]
-
-
-def alternative_number(method: str) -> int:
-    """Which dance of its method: 1 for the best, 2 and on for alternatives."""
-    return int(method.partition("_")[2] or 1)
 
 
 def song_and_method(key: str) -> tuple[str, str]:

@@ -5,12 +5,13 @@ from collections.abc import Iterator, Mapping
 import dagster as dg
 import numpy as np
 
-from assets import hmm_plots, hmm_tables
 from assets.declare import table_assets
 from assets.formats import audio, midi
-from assets.lineage import Part, Parts, Progress, Stored, repeatable, version_of
 from assets.partitions import SONG, lake_key
-from assets.sources import Studio, brief_version, song_version
+from assets.plots import hmm as hmm_plots
+from assets.sources.sources import Studio, brief_version, song_version
+from assets.stamps import Part, Parts, Progress, Stored, repeatable, version_of
+from assets.tables import hmm as hmm_tables
 from kernels.music.percussion import Contour, band_hits, contour, drum_hits
 from kernels.music.preview import render_preview
 from schemas.music import MELODY, PERCUSSION

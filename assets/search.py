@@ -11,22 +11,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from assets import search_plots, search_tables, tables
-from assets.declare import table_asset
-from assets.lineage import (
-    Earlier,
-    Part,
-    Parts,
-    Progress,
-    Stored,
-    clip_versions,
-    code_version,
-    content_version,
-    per_clip,
-    repeatable,
-)
+from assets.declare import code_version, table_asset
 from assets.partitions import EVERY, SESSION
-from assets.sources import Studio
+from assets.plots import search as search_plots
+from assets.sources.sources import Studio
+from assets.stamps import Earlier, Part, Parts, Progress, Stored, clip_versions, content_version, per_clip, repeatable
+from assets.tables import pack as tables
+from assets.tables import search as search_tables
 from kernels.search.aligned import track
 from kernels.search.encoder import Encoder, from_arrays
 from kernels.search.measure import leave_one_out

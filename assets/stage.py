@@ -11,18 +11,20 @@ import polars as pl
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from assets import licences, tables
-from assets.characters import Cast, CharacterError, character_of, character_version, dress, read_clip, read_file
+from assets.dancing import licences
+from assets.dancing.characters import Cast, CharacterError, character_of, character_version, dress, read_clip, read_file
 from assets.declare import table_asset
 from assets.formats import audio, midi
 from assets.formats.audio import Audio
 from assets.formats.usd_character import is_file
-from assets.lineage import Progress, Stored
 from assets.partitions import DANCE, EVERY, lake_key
-from assets.sources import Studio
+from assets.sources.sources import Studio
+from assets.stamps import Progress, Stored
+from assets.tables import pack as tables
 from kernels.music.preview import render_preview
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Choreography, Clip
+from kernels.warp import EASY_WARP
 from schemas.choreography import CHOREOGRAPHY, USD_ANIMATION
 from schemas.keys import source_clip
 
@@ -161,7 +163,7 @@ def outside_warp(steps: Choreography) -> list[dict[str, Any]]:
             "clip_id": source_clip(steps.clip_id[i]),
             "warp_ratio": round(float(warp[i]), 4),
         }
-        for i in np.flatnonzero((warp < 0.90 - 1e-6) | (warp > 1.10 + 1e-6))
+        for i in np.flatnonzero((warp < EASY_WARP[0] - 1e-6) | (warp > EASY_WARP[1] + 1e-6))
     ]
 
 

@@ -33,9 +33,9 @@ from kernels.hmm.character import identify  # noqa: E402
 from kernels.hmm.evidence import measure  # noqa: E402
 from kernels.hmm.viterbi import viterbi  # noqa: E402
 from kernels.synthetic import performance as made_up  # noqa: E402
-from pipelines import commands  # noqa: E402
-from pipelines.lake import Lake  # noqa: E402
+from pipelines.commands.dance import dance_songs  # noqa: E402
 from pipelines.resources import NoProgress, StudioFolder  # noqa: E402
+from pipelines.studio.lake import Lake  # noqa: E402
 
 DATA = Path(os.environ.get("ODORI_TEST_DATA", REPOSITORY.parent / "shared" / "data"))
 N_MOTIONS, INTERVAL_S = 2400, 0.5
@@ -82,9 +82,9 @@ def write(root: Path, name: str, performed: made_up.Performance, subject: str = 
     (root / "songs" / f"{name}.mid").write_bytes(midi.format(performed.notes, tempo=performed.tempo))
 
 
-def dance(root: Path, songs: list[str]) -> Any:  # noqa: ANN401 - pipelines.outcome.Outcome
+def dance(root: Path, songs: list[str]) -> Any:  # noqa: ANN401 - pipelines.commands.outcome.Outcome
     """Dance songs by the model."""
-    return commands.dance(root, songs, method="hmm", frame_rate_hz=None, out=None, progress=NoProgress)
+    return dance_songs(root, songs, method="hmm", frame_rate_hz=None, out=None, progress=NoProgress)
 
 
 def whole(seed: int, n_motions: int) -> dict[str, float]:

@@ -30,7 +30,7 @@ from assets.formats import bvh, midi  # noqa: E402
 from kernels.hmm.character import chance_of, nearest_dancer, pose_windows  # noqa: E402
 from kernels.synthetic import performance as made_up  # noqa: E402
 from kernels.types import Float  # noqa: E402
-from pipelines import commands  # noqa: E402
+from pipelines.commands.dance import dance_songs  # noqa: E402
 from pipelines.resources import NoProgress, StudioFolder  # noqa: E402
 
 DATA = Path(os.environ.get("ODORI_TEST_DATA", REPOSITORY.parent / "shared" / "data"))
@@ -94,7 +94,7 @@ def known_takes(root: Path, dancers: list[str]) -> list[Float]:
 def dances(root: Path, dancer: str, songs: list[str]) -> list[Float]:
     """Dance the songs by one dancer's model; stretches of each finished dance."""
     (root / "odori.toml").write_text(f'[choreography_model]\nsubject = "{dancer}"\n')
-    made = commands.dance(root, songs, method="hmm", frame_rate_hz=None, out=None, progress=NoProgress)
+    made = dance_songs(root, songs, method="hmm", frame_rate_hz=None, out=None, progress=NoProgress)
     if made.status:
         raise SystemExit("; ".join(made.troubles))
     lake = StudioFolder(root).lake

@@ -42,7 +42,7 @@ def make_studio(root: Path, song: Path | None) -> int:
         chosen = song or DATA / "audio_beats" / "fof_muldjord_chaos_god.ogg"
         shutil.copy(chosen, root / "songs" / f"song{chosen.suffix}")
     else:
-        from pipelines import demo_studio
+        from pipelines.commands import demo_studio
 
         demo_studio.make(root)
         (root / "songs" / "drum_machine.mid").unlink()

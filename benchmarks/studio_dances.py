@@ -18,13 +18,15 @@ from pathlib import Path
 import numpy as np
 from upath import UPath
 
-from assets import tables
 from assets.dance import load_clips
-from assets.direction import Song
-from assets.graph_path import Catalogue, Direction, by_graph, catalogue, heard_song, read_clips
+from assets.dancing.asked import Direction
+from assets.dancing.by_graph import Catalogue, by_graph, catalogue
+from assets.reading.clips import read_clips
+from assets.reading.songs import PlayedSong, heard_song
+from assets.tables import pack as tables
 from kernels.types import Choreography, Clip, Float
 from pipelines.io_managers import StoredTable
-from pipelines.lake import Lake
+from pipelines.studio.lake import Lake
 from schemas.settings import Settings
 
 REPOSITORY = Path(__file__).parents[1]
@@ -71,9 +73,9 @@ class BuiltStudio:
             self._lake.table("motion_graph_node"), self._lake.table("motion_graph_edge")
         )
         clip = self.stored("clip")
-        return catalogue(graph, clip_ids, read_clips([clip.read(key) for key in clip.keys]), ())
+        return catalogue(graph, clip_ids, read_clips(clip), ())
 
-    def song(self, key: str) -> Song:
+    def song(self, key: str) -> PlayedSong:
         """Read the beats of a song."""
         grid = tables.to_music_beat(self._lake.table("music_beat", key))
         duration_s = float(max(self._lake.table("song", key)["duration_s"].to_pylist()))

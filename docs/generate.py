@@ -15,8 +15,8 @@ def data() -> str:
     """Every table: what a row is, its key, its columns with types, units and meanings."""
     parts = [
         "# The tables\n\nMade by `make docs` from `schemas/`. Files: `lake/<table>/<partition>.parquet`; tables not\n"
-        "cut are `all.parquet`, those of a song and a method `<song>|<method>.parquet`. Frame tables have one row a\n"
-        "frame; per-joint values are in the order of the schema metadata `joints`.\n"
+        "cut are `all.parquet`, those of a song and a method `<song>|<method>.parquet` (on Windows `%7C` for `|`).\n"
+        "Frame tables have one row a frame; per-joint values are in the order of the schema metadata `joints`.\n"
     ]
     return "\n".join([*parts, *(_table(table) for table in TABLES.values())])
 

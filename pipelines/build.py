@@ -4,7 +4,6 @@ The command, the sensor and the schedule share the planning here; the command al
 Dagster runs on the studio's own instance, so the UI shows them like any other.
 """
 
-import fcntl
 import os
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,14 +12,16 @@ from pathlib import Path
 from typing import Any
 
 import dagster as dg
+import filelock
 from dagster_shared.error import SerializableErrorInfo
 
 from assets.formats import beside
 from assets.partitions import SESSION, SONG, dagster_key, lake_key
-from pipelines.files import StudioError, why
 from pipelines.freshness import Finding, Freshness
 from pipelines.jobs import JOB_OF_GROUP, job_of
-from pipelines.resources import StudioFolder
+from pipelines.processes import is_running, started
+from pipelines.studio.files import StudioError, why
+from pipelines.studio.folder import StudioFolder
 from schemas.keys import check_key
 
 # Stages in order; the groups of one stage run together, clip by clip carried over.
@@ -28,6 +29,8 @@ STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("cata
 GROUPS = tuple(JOB_OF_GROUP)
 _RANGE_START, _RANGE_END = "dagster/asset_partition_range_start", "dagster/asset_partition_range_end"
 PID_TAG = "odori/pid"
+FindJob = Callable[[str], dg.JobDefinition]
+"""Gives a job by its name."""
 
 
 @dataclass(frozen=True)
@@ -185,9 +188,9 @@ def _neighbours(keys: list[str], kind: str, instance: dg.DagsterInstance) -> lis
     return runs
 
 
-def execute(batch: Batch, definitions: dg.Definitions, instance: dg.DagsterInstance) -> list[Trouble]:
+def execute(batch: Batch, find_job: FindJob, instance: dg.DagsterInstance) -> list[Trouble]:
     """Run a batch in this process; what failed."""
-    job = definitions.resolve_job_def(batch.job)
+    job = find_job(batch.job)
     result = job.execute_in_process(
         instance=instance,
         asset_selection=[dg.AssetKey(asset) for asset in batch.assets],
@@ -235,7 +238,7 @@ def _cause(where: str, error: SerializableErrorInfo) -> str:
 
 def bring_up_to_date(
     studio: StudioFolder,
-    definitions: dg.Definitions,
+    find_job: FindJob,
     instance: dg.DagsterInstance,
     state: Freshness,
     *,
@@ -258,11 +261,11 @@ def bring_up_to_date(
             for batch in planned.without(given_up):  # what it would be made from may have failed a moment ago
                 tried.add(batch)
                 report.ran.append(batch)
-                failed = execute(batch, definitions, instance)
+                failed = execute(batch, find_job, instance)
                 if failed and len(batch.keys) > 1:  # one partition's trouble must not stop its neighbours: one by one
                     for single in batch.singles():
                         tried.add(single)
-                        failed = execute(single, definitions, instance)
+                        failed = execute(single, find_job, instance)
                         report.troubles += failed
                         given_up |= unmade(single, state) if failed else set()
                 else:
@@ -326,22 +329,23 @@ def exclusive(studio: StudioFolder) -> Iterator[None]:
     place = studio.root / "lake" / ".lock"
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        file = place.open("a")
+        lock = filelock.FileLock(place, blocking=False).acquire()
+    except filelock.Timeout as error:
+        raise StudioError(f"{studio.root}: another odori is building it; wait for it to finish") from error
     except OSError as error:
         raise StudioError(f"{studio.root}: cannot be written: {why(error)}") from error
-    with file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise StudioError(f"{studio.root}: another odori is building it; wait for it to finish") from error
+    with lock:
         yield
 
 
 def clear_after_kill(studio: StudioFolder, instance: dg.DagsterInstance) -> int:
     """Tidy up after a run that was killed: half-made files, and runs that Dagster still takes for running.
 
+    What another system named otherwise gets its name here.
+
     Only to be called while the studio is held.
     """
+    studio.lake.name_anew()
     removed: int = studio.lake.sweep() + beside.sweep(studio.dances)
     end_dead_runs(instance)
     return removed
@@ -357,35 +361,15 @@ UNFINISHED = (
 
 def own_tags() -> dict[str, str]:
     """Tags of a run that this process starts or asks for: by them it is known to be dead when the process is."""
-    return {PID_TAG: f"{os.getpid()} {_started(os.getpid())}"}
+    return {PID_TAG: f"{os.getpid()} {started(os.getpid())}"}
 
 
 def end_dead_runs(instance: dg.DagsterInstance, *, untagged: bool = False) -> None:
     """Report runs as failed whose process is gone; with ``untagged`` also those that were started by hand in the UI."""
     for run in instance.get_runs(dg.RunsFilter(statuses=list(UNFINISHED))):
-        pid, _, started = run.tags.get(PID_TAG, "").partition(" ")
-        if _started(int(pid)) != started if pid.isdigit() else untagged:
+        pid, _, since = run.tags.get(PID_TAG, "").partition(" ")
+        if not is_running(int(pid), since) if pid.isdigit() else untagged:
             instance.report_run_failed(run, "its process was killed; the next build does its work again")
-
-
-def _started(pid: int) -> str:
-    """When a process started, in the kernel's ticks, so that a number used again is not taken for it; "" when gone."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_text()
-    except FileNotFoundError:
-        if Path("/proc/self/stat").exists():
-            return ""
-    except OSError:
-        pass
-    else:
-        return text.rpartition(")")[2].split()[19]
-    try:  # no /proc here: whether it is alive must do
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return ""
-    except PermissionError:
-        pass
-    return "alive"
 
 
 # Odori prints nothing inside a run that its metadata and events do not say better: no log files beside each run.
@@ -413,15 +397,20 @@ def open_instance(studio: StudioFolder) -> dg.DagsterInstance:
         home.mkdir(parents=True, exist_ok=True)
         owner = home / "odori-studio"
         if not owner.exists():
-            owner.write_text(f"{studio.root}\n")
-        elif home != studio.root / ".dagster" and owner.read_text().strip() != str(studio.root):
+            owner.write_bytes(f"{studio.root}\n".encode("utf-8", "surrogateescape"))
+        elif home != studio.root / ".dagster" and (of := _owner(owner)) != str(studio.root):
             raise StudioError(
-                f"{home}: want Dagster's storage of {studio.root}, got that of {owner.read_text().strip()}; "
+                f"{home}: want Dagster's storage of {studio.root}, got that of {of}; "
                 "set DAGSTER_HOME to a folder of its own for each studio"
             )
         configuration = home / "dagster.yaml"
         if not configuration.exists():
-            configuration.write_text(_CONFIGURATION)
+            configuration.write_text(_CONFIGURATION, encoding="utf-8")
         return dg.DagsterInstance.from_config(str(home))
     except OSError as error:
         raise StudioError(f"{home}: cannot be written: {why(error)}") from error
+
+
+def _owner(place: Path) -> str:
+    """Read whose storage it is; the path of a studio need not be text of any encoding."""
+    return place.read_bytes().decode("utf-8", "surrogateescape").strip()

@@ -4,10 +4,12 @@ Each command prints a short report, or with ``--json`` exactly one object on sta
 standard error. Exit status: 0 done, 1 done but some inputs were refused, 2 nothing done.
 """
 
+import io
 import json
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -36,6 +38,21 @@ StudioOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the report.")]
 
 
+def _say_version(is_asked: bool) -> None:
+    if is_asked:
+        sys.stdout.write(f"odori {version('odori')}\n")
+        raise typer.Exit
+
+
+@app.callback()
+def odori(
+    is_version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_say_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Take options that belong to no command."""
+
+
 @app.command()
 def demo(
     studio: Annotated[Path, typer.Option("--studio", help="Folder for the made-up studio.")] = Path("demo"),
@@ -45,7 +62,7 @@ def demo(
 
     Example: odori demo
     """
-    from pipelines import demo_studio
+    from pipelines.commands import demo_studio
 
     with _Trouble(as_json):
         demo_studio.make(studio)
@@ -63,10 +80,10 @@ def build(
 
     Examples: odori build · odori build --studio /shows/nagoya --dances
     """
-    from pipelines import commands
+    from pipelines.commands.build import build_studio
 
     with _Trouble(as_json):
-        result = commands.build(_folder(studio), dances=dances, progress=_progress())
+        result = build_studio(_folder(studio), dances=dances, progress=_progress())
         _finish(result, as_json)
 
 
@@ -132,13 +149,13 @@ def dance(
 
 
 def _propose(studio: Path | None, songs: list[str], place: str, pins: Sequence[str], as_json: bool) -> None:
-    from pipelines import commands
-    from pipelines.files import StudioError
+    from pipelines.commands.propose import propose_pins
+    from pipelines.studio.files import StudioError
 
     with _Trouble(as_json):
         if len(songs) != 1:
             raise StudioError(f"--propose: want one song, got {len(songs)}; ask for each alone")
-        result = commands.propose(_folder(studio), songs[0], place, pins=pins, progress=_progress())
+        result = propose_pins(_folder(studio), songs[0], place, pins=pins, progress=_progress())
         _finish(result, as_json)
 
 
@@ -149,12 +166,12 @@ def _dance(
     fps: float | None,
     out: Path | None,
     as_json: bool,
-    **more: Any,  # noqa: ANN401 - what else commands.dance takes
+    **more: Any,  # noqa: ANN401 - what else dance_songs takes
 ) -> None:
-    from pipelines import commands
+    from pipelines.commands.dance import dance_songs
 
     with _Trouble(as_json):
-        result = commands.dance(
+        result = dance_songs(
             _folder(studio), songs, method=method, frame_rate_hz=fps, out=out, progress=_progress(), **more
         )
         _finish(result, as_json)
@@ -175,10 +192,10 @@ def why(
     Examples: odori why waltz --at 12.34 · odori why 'waltz|graph_2' · odori why dances/waltz/graph.usdz --at 12.34 (a
     stage answers for itself and needs no studio)
     """
-    from pipelines import commands
+    from pipelines.commands.why import explain_dance
 
     with _Trouble(as_json):
-        _finish(commands.why(_folder(studio), danced, at_s=at), as_json)
+        _finish(explain_dance(_folder(studio), danced, at_s=at), as_json)
 
 
 @app.command()
@@ -190,10 +207,10 @@ def check(
 
     Example: odori check dances/waltz/graph.usdz
     """
-    from pipelines import commands
+    from pipelines.commands.check import check_stage
 
     with _Trouble(as_json):
-        _finish(commands.check(file), as_json)
+        _finish(check_stage(file), as_json)
 
 
 @app.command()
@@ -227,7 +244,7 @@ def search(
     odori search --like ayame-step --unlike kaede-kick --sheet hits.png
     """
     with _Trouble(as_json):
-        from pipelines import search as searching
+        from pipelines.commands import search as searching
 
         wish = searching.Wish(
             query=clip or "",
@@ -265,7 +282,7 @@ def calibrate(
     Examples: odori calibrate take.parquet · odori calibrate take.csv --bvh take.bvh
     """
     with _Trouble(as_json):
-        from pipelines import calibrate as calibrating
+        from pipelines.commands import calibrate as calibrating
 
         result = calibrating.calibrate(
             recording,
@@ -290,7 +307,7 @@ def status(
 
     Examples: odori status · odori status --json · odori status --devices (needs no studio)
     """
-    from pipelines.status import status as say_status
+    from pipelines.commands.status import status as say_status
 
     with _Trouble(as_json):
         _finish(say_status(_folder(studio), devices=devices), as_json)
@@ -320,15 +337,29 @@ def _say(text: str, as_json: bool) -> None:
     (TROUBLE if as_json else Console(highlight=False, soft_wrap=True, markup=False, emoji=False)).print(text)
 
 
-def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - a commands.Outcome; typed where it is loaded
+def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - a Outcome; typed where it is loaded
     for line in result.troubles:
         TROUBLE.print(line)
     if as_json:
-        _answered.append(True)
-        sys.stdout.write(json.dumps(result.facts, ensure_ascii=False, sort_keys=True) + "\n")
+        _answer(result.facts)
     elif result.report:
         _say(result.report, as_json)
     raise typer.Exit(result.status)
+
+
+def _answer(facts: Mapping[str, Any]) -> None:
+    """Print the one JSON object: in UTF-8, whatever the console or the pipe would have it in."""
+    _answered.append(True)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
+    sys.stdout.write(json.dumps(facts, ensure_ascii=False, sort_keys=True) + "\n")
+
+
+def _settle_streams() -> None:
+    """Let no sign end a report: what the encoding of a console lacks is written as its number."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 class _Trouble:
@@ -344,20 +375,19 @@ class _Trouble:
         if error is None or isinstance(error, typer.Exit):
             return
         from assets.formats.errors import FormatError
-        from pipelines.files import LakeError, StudioError
+        from pipelines.studio.files import LakeError, StudioError
 
         if isinstance(error, StudioError | LakeError | FormatError | LookupError | OSError):
             text = error.args[0] if isinstance(error, LookupError) and error.args else str(error)
             TROUBLE.print(f"odori: {text}")
             if self._as_json:
-                _answered.append(True)
-                sys.stdout.write(json.dumps({"error": str(text)}) + "\n")
+                _answer({"error": str(text)})
             raise typer.Exit(NOTHING_DONE) from error
 
 
 def _progress() -> Callable[[], Any]:
     """Make a progress bar on standard error, or nothing where that is no terminal."""
-    from pipelines.progress import Bar
+    from pipelines.commands.progress import Bar
     from pipelines.resources import NoProgress
 
     return Bar if sys.stderr.isatty() else NoProgress
@@ -368,11 +398,12 @@ def main() -> None:
     for library in ("OPENBLAS", "OMP", "MKL"):  # more threads change last bits: same inputs, same bytes
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     settle()
+    _settle_streams()
     try:
         app()
     except SystemExit as ended:
         if ended.code == NOTHING_DONE and "--json" in sys.argv and not _answered:  # a usage error, said by the parser
-            sys.stdout.write(json.dumps({"error": "the command line is wrong; standard error says how"}) + "\n")
+            _answer({"error": "the command line is wrong; standard error says how"})
         raise
 
 

@@ -6,7 +6,7 @@ import dagster as dg
 
 from assets import capture, choreography, dance, graph, hmm, matching, motion, music, percussion, search, stage
 from pipelines.freshness import Freshness, nodes
-from pipelines.resources import StudioFolder
+from pipelines.studio.folder import StudioFolder
 
 ASSETS: Sequence[dg.AssetsDefinition] = [
     asset

@@ -9,8 +9,10 @@ from pipelines.caches import settle
 from pipelines.collection import ASSETS, freshness
 from pipelines.devices import Devices
 from pipelines.io_managers import EarlierTables, IndexIOManager, LakeIOManager, StageIOManager
-from pipelines.resources import GraphMemory, NoProgress, StudioFolder, studio_from_environment
-from pipelines.twins import Distances, Matches, PoseSolvers
+from pipelines.resources import GraphMemory, NoProgress
+from pipelines.solvers import PoseSolvers
+from pipelines.studio.folder import StudioFolder, studio_from_environment
+from pipelines.twins import Distances, Matches
 
 
 def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> dg.Definitions:  # noqa: ANN401 - resources are of any type
@@ -24,10 +26,12 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
     settle()
     folder = studio or studio_from_environment()
     devices: dict[str, Devices] = {}
+    made: list[dg.Definitions] = []
     # Made for each run anew: a run keeps to the settings and sources it began with, and its stamps say so.
     resources: dict[str, Any] = {
         "studio": dg.ResourceDefinition(lambda _: folder.frozen()),
         "earlier": EarlierTables(folder.lake),
+        "find_job": dg.ResourceDefinition(lambda _: made[0].resolve_job_def),
         "progress": NoProgress(),
         "devices": dg.ResourceDefinition(
             lambda context: _devices(devices, context.resources.studio.settings().opencl.device),
@@ -57,7 +61,7 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
             required_resource_keys={"studio"},
         ),
     }
-    return dg.Definitions(
+    definitions = dg.Definitions(
         assets=ASSETS,
         jobs=[*jobs.JOBS, schedules.rebuild_all],
         schedules=[schedules.nightly],
@@ -65,6 +69,8 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
         resources=resources | overrides,
         executor=dg.in_process_executor,
     )
+    made.append(definitions)
+    return definitions
 
 
 def _devices(known: dict[str, Devices], wanted: str) -> Devices:

@@ -233,7 +233,7 @@ class Devices:
             raise DeviceError(
                 f"[opencl] device: {name} failed: {reason}; leave the setting out and the next that works takes over, "
                 f"or name another ('{REFERENCE}' needs no driver)"
-            ) from error
+            ) from None  # a run tells the first cause of all, and that would be the driver's words alone
         self._failed[index] = reason
         self._said = True
         following = self.in_use()

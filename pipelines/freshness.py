@@ -9,19 +9,20 @@ import dataclasses
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import dagster as dg
 
-from assets import sources as source_kinds
-from assets.characters import character_version
+from assets.dancing.characters import character_version
+from assets.dancing.methods import ALTERNATIVES, METHODS
 from assets.declare import KEEPS_KEY, METHODS_KEY, ONLY_FOR_KEY, SETTINGS_KEY, SOURCES_KEY
-from assets.lineage import Stamp, version_of
-from assets.partitions import ALTERNATIVES, METHODS, base_method
-from assets.sources import Sources
-from pipelines.files import StudioError
-from pipelines.lake import Lake
-from pipelines.resources import StudioFolder
+from assets.sources import sources as source_kinds
+from assets.sources.sources import Sources
+from assets.stamps import Stamp, version_of
+from pipelines.studio.files import StudioError
+from pipelines.studio.folder import StudioFolder
+from pipelines.studio.lake import Lake
+from schemas.keys import base_method
 
 STAGE_IO_MANAGER = "stage"
 ON_DEMAND = ("search",)
@@ -34,9 +35,9 @@ State = Literal["fresh", "stale", "missing", "waiting"]
 class Node:
     """One asset as freshness sees it.
 
-    ``together`` are the assets made in the same pass, itself included; ``methods`` says, of an input or a section of
-    settings (in brackets), which methods of dancing need it: every method does where nothing is said. ``only_for`` is
-    the one method an asset is made for, where there is one. ``keeps``: once made it stays when its inputs change.
+    ``together`` are the assets made in the same pass, itself included. ``methods`` are the methods of dancing it is
+    made by, where there are several: each has a version and reads some of the inputs and settings. ``only_for`` is the
+    one method an asset is made for, where there is one. ``keeps``: once made it stays when its inputs change.
     """
 
     name: str
@@ -48,18 +49,29 @@ class Node:
     sources: str
     together: tuple[str, ...]
     writes_stages: bool = False
-    methods: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    methods: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     only_for: str = ""
     keeps: bool = False
 
-    def needs(self, name: str, key: str) -> bool:
-        """Whether a partition of this asset is made from an input, or from a section of settings in brackets."""
-        method = base_method(key.split("|")[-1])
-        return self.kind != "dance" or method in self.methods.get(name, method).split(",")
-
     def inputs_of(self, key: str) -> list[str]:
-        """List the inputs that a partition is made from."""
-        return [name for name in self.inputs if self.needs(name, key)]
+        """List the inputs that a partition is made from: those its method reads, and those no method names."""
+        return self._read(self.inputs, "inputs", key)
+
+    def settings_of(self, key: str) -> list[str]:
+        """List the settings that a partition is made with: those its method reads, and those no method names."""
+        return self._read(self.settings, "settings", key)
+
+    def code_version_of(self, key: str) -> str:
+        """Version of the code a partition is made by: its method's, where it has one."""
+        method = self.methods.get(base_method(key.split("|")[-1]))
+        return str(method["version"]) if method else self.code_version
+
+    def _read(self, names: Sequence[str], kind: str, key: str) -> list[str]:
+        own = self.methods.get(base_method(key.split("|")[-1]))
+        if own is None:
+            return list(names)
+        of_others = {name for method in self.methods.values() for name in method[kind]} - set(own[kind])
+        return [name for name in names if name not in of_others]
 
 
 @dataclass(frozen=True)
@@ -88,7 +100,7 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
                 str(spec.metadata.get(SOURCES_KEY, "")),
                 together,
                 definition.get_io_manager_key_for_asset_key(spec.key) == STAGE_IO_MANAGER,
-                dict(said.split("=") for said in str(spec.metadata.get(METHODS_KEY, "")).split()),
+                _plain(spec.metadata.get(METHODS_KEY, {})),
                 str(spec.metadata.get(ONLY_FOR_KEY, "")),
                 KEEPS_KEY in spec.metadata,
             )
@@ -97,6 +109,10 @@ def nodes(assets: Iterable[dg.AssetsDefinition]) -> dict[str, Node]:
         ready = [n for n in found.values() if n.name not in ordered and all(i in ordered for i in n.inputs)]
         ordered |= {n.name: n for n in ready}
     return ordered
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - as an asset declares it, or as Dagster wraps it
+    return getattr(value, "value", value)
 
 
 def _kind(partitions: dg.PartitionsDefinition | None) -> Kind:
@@ -180,7 +196,7 @@ class Freshness:
     def is_used(self, method: str) -> bool:
         """Whether a method is used: a dance by it was asked for, or there are performances for it to learn from."""
         danced = any(base_method(key.split("|")[-1]) == method for key in self.keys("dance"))
-        return danced or (method == "hmm" and bool(self.sources.performed_songs))
+        return danced or (METHODS[method].learns and bool(self.sources.performed_songs))
 
     def needed_for(self, key: str) -> set[str]:
         """Assets a dance is made from, its own included: those of the other methods are not."""
@@ -207,10 +223,9 @@ class Freshness:
         settings = dataclasses.asdict(self._studio.settings())
         node = self.assets[asset]
         read = {}
-        for name in node.settings:
+        for name in node.settings_of(key):
             section, _, one = name.partition(".")
-            if node.needs(f"[{name}]", key):
-                read[name] = settings[section][one] if one else settings[section]
+            read[name] = settings[section][one] if one else settings[section]
         return source_kinds.fingerprint(read)
 
     def source_version(self, asset: str, key: str) -> str:
@@ -281,10 +296,11 @@ class Freshness:
         stamp = self.stamp(asset, key)
         if stamp is None:
             return Finding(asset, key, "missing", "never made")
-        if stamp.code_version != node.code_version:
-            return Finding(asset, key, "stale", f"code version {stamp.code_version} is now {node.code_version}")
+        if stamp.code_version != node.code_version_of(key):
+            now = node.code_version_of(key)
+            return Finding(asset, key, "stale", f"code version {stamp.code_version} is now {now}")
         if stamp.settings != self.settings_version(asset, key):
-            return Finding(asset, key, "stale", f"settings [{'], ['.join(node.settings)}] changed")
+            return Finding(asset, key, "stale", f"settings [{'], ['.join(node.settings_of(key))}] changed")
         expected = ({} if node.keeps else inputs) | (
             {"sources": self.source_version(asset, key)} if node.sources else {}
         )

@@ -13,23 +13,23 @@ from typing import Any
 import dagster as dg
 import pyarrow as pa
 
-from assets import tables
 from assets.formats import audio, motion_index, tree, usd, usd_cast, usd_package
-from assets.lineage import Part, Parts, Stamp, content_version
 from assets.partitions import dagster_key, lake_key
 from assets.search import Index
 from assets.stage import Stage
-from pipelines.files import LakeError, why, write_beside
+from assets.stamps import Part, Parts, Stamp, content_version
+from assets.tables import pack as tables
 from pipelines.freshness import Freshness
-from pipelines.lake import Lake
-from pipelines.resources import StudioFolder
+from pipelines.studio.files import LakeError, why, write_beside
+from pipelines.studio.folder import StudioFolder
+from pipelines.studio.lake import Lake
 from schemas.catalog import TABLES
 from schemas.choreography import USD_ANIMATION
 from schemas.search import MOTION_INDEX
 
 
 class StoredTable:
-    """An upstream asset on disk; see :class:`assets.lineage.Stored`."""
+    """An upstream asset on disk; see :class:`assets.stamps.Stored`."""
 
     def __init__(self, lake: Lake, asset: str, keys: Sequence[str]) -> None:
         self._lake, self._asset, self._keys = lake, asset, list(keys)
@@ -52,7 +52,7 @@ class StoredTable:
 
 
 class EarlierTables:
-    """What the lake held before; see :class:`assets.lineage.Earlier`."""
+    """What the lake held before; see :class:`assets.stamps.Earlier`."""
 
     def __init__(self, lake: Lake) -> None:
         self._lake = lake
@@ -70,7 +70,7 @@ class EarlierTables:
 
 
 class LakeIOManager(dg.IOManager):
-    """Stores :class:`~assets.lineage.Parts` or a table; loads a table, or a handle where one is annotated."""
+    """Stores :class:`~assets.stamps.Parts` or a table; loads a table, or a handle where one is annotated."""
 
     def __init__(self, lake: Lake, freshness: Freshness) -> None:
         self._lake, self._freshness = lake, freshness
@@ -96,7 +96,7 @@ class LakeIOManager(dg.IOManager):
         if part.sources:
             inputs = inputs | {"sources": part.sources}
         stamp = Stamp(
-            self._freshness.assets[asset].code_version,
+            self._freshness.assets[asset].code_version_of(part.key),
             self._freshness.settings_version(asset, part.key),
             inputs,
             content_version(table),
@@ -154,7 +154,7 @@ class StageIOManager(LakeIOManager):
         """Write sound, stage, package and report, then the row."""
         if not isinstance(obj, Stage):
             raise TypeError(f"usd_animation: want a Stage, got {type(obj).__name__}")
-        folder = self._studio.dances / obj.song_id
+        folder = self._studio.dances_of(obj.song_id)
         try:
             written = write_dance(folder, obj)
         except OSError as error:
@@ -163,7 +163,7 @@ class StageIOManager(LakeIOManager):
             {
                 "song_id": obj.song_id,
                 "method_name": obj.method,
-                "stage_path": str(path.relative_to(self._studio.root)),
+                "stage_path": path.relative_to(self._studio.root).as_posix(),
                 "stage_sha256": tree.sha256(path),
                 "frame_count": obj.clip.n_frames,
                 "frame_rate_hz": obj.clip.frame_rate_hz,

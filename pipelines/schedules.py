@@ -4,19 +4,17 @@ import dagster as dg
 
 from pipelines import build
 from pipelines.collection import freshness
-from pipelines.resources import StudioFolder
+from pipelines.studio.folder import StudioFolder
 
 
 @dg.op(description="Brings catalogue and dances up to date, stage by stage, as `odori build --dances` does.")
-def bring_up_to_date(context: dg.OpExecutionContext, studio: dg.ResourceParam[StudioFolder]) -> None:
+def bring_up_to_date(
+    context: dg.OpExecutionContext, studio: dg.ResourceParam[StudioFolder], find_job: dg.ResourceParam[build.FindJob]
+) -> None:
     """Run whatever is stale, each batch as an ordinary run of its own; fail when something could not be made."""
-    from pipelines.definitions import build_definitions  # it loads this module
-
     with build.exclusive(studio):
         build.clear_after_kill(studio, context.instance)
-        report = build.bring_up_to_date(
-            studio, build_definitions(studio), context.instance, freshness(studio), groups=build.GROUPS
-        )
+        report = build.bring_up_to_date(studio, find_job, context.instance, freshness(studio), groups=build.GROUPS)
     context.add_output_metadata({"runs": len(report.ran), "failed": dg.MetadataValue.json(report.failed)})
     if report.failed:
         raise dg.Failure("; ".join(report.failed), allow_retries=False)

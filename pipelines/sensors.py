@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 import dagster as dg
 
-from assets.sources import fingerprint
+from assets.sources.sources import fingerprint
 from pipelines import build
 from pipelines.collection import freshness
-from pipelines.files import StudioError
 from pipelines.freshness import Freshness
 from pipelines.jobs import JOBS
-from pipelines.resources import StudioFolder
+from pipelines.studio.files import StudioError
+from pipelines.studio.folder import StudioFolder
 
 RUN_KEY_TAG = "dagster/run_key"
 

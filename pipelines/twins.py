@@ -1,17 +1,14 @@
-"""What the stages compute on, each on the device in use: matches, pose distances, poses of suits.
+"""What the stages compute on, each on the device in use: matches and pose distances.
 
 Every one has a twin in NumPy, the reference, for machines without a device.
 """
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Any
 
 from numpy.typing import NDArray
 
 from assets.matching import SegmentMatcher
-from kernels.calibration.records import PARENT
-from kernels.calibration.springs import relax_springs
-from kernels.calibration.tree_solver import BodyModel, PoseSolver, Solved, Stream, solve_tree
 from kernels.graph.distance import PairDistance, PoseFeatures, pose_distance
 from kernels.matching.score import Match
 from pipelines.devices import Devices, OnDevice
@@ -119,39 +116,6 @@ class Catalogue:
         return self._made[1]
 
 
-class PoseSolvers:
-    """What poses of suits are solved on, by method, built when first asked for; OpenCL is loaded then.
-
-    Parameters
-    ----------
-    devices : Devices
-    """
-
-    def __init__(self, devices: Devices) -> None:
-        self._devices = devices
-        self._made: dict[str, _Solver] = {}
-
-    def __call__(self, method: str) -> PoseSolver:
-        """Solver of a method on the device in use."""
-        if method not in self._made:
-            self._made[method] = _Solver(self._devices, method)
-        return self._made[method]
-
-
-class _Solver:
-    """Poses of a suit by one method on the device in use; see :class:`kernels.calibration.tree_solver.PoseSolver`."""
-
-    def __init__(self, devices: Devices, method: str) -> None:
-        self._on: OnDevice[PoseSolver] = OnDevice(devices, lambda context: _solver(context, method))
-
-    @property
-    def name(self) -> str:
-        return self._on.name
-
-    def __call__(self, model: BodyModel, stream: Stream, *, iterations: int) -> Solved:
-        return self._on.use(lambda solver: solver(model, stream, iterations=iterations))
-
-
 def _distance(context: Any) -> PairDistance:  # noqa: ANN401 - a cl.Context or None
     if context is None:
         return pose_distance
@@ -168,17 +132,3 @@ def _matcher(context: Any, memory_bytes: int) -> SegmentMatcher:  # noqa: ANN401
     from kernels.opencl.match import Matcher
 
     return Matcher(context, memory_bytes=memory_bytes)
-
-
-def _solver(context: Any, method: str) -> PoseSolver:  # noqa: ANN401 - a cl.Context or None
-    if context is None:
-        return relax_springs if method == "springs" else solve_tree
-    device = context.devices[0]
-    precision: Literal["single", "double"] = "double" if device.double_fp_config else "single"
-    if method == "springs":
-        from kernels.opencl.spring_relaxation import SpringRelaxation
-
-        return SpringRelaxation(context, parent=PARENT, precision=precision)
-    from kernels.opencl.tree_gauss_newton import TreeGaussNewton
-
-    return TreeGaussNewton(context, parent=PARENT, precision=precision)

@@ -11,9 +11,9 @@ import time
 from pathlib import Path
 from types import FrameType
 
+from pipelines import processes
 from pipelines.build import end_dead_runs, open_instance
-from pipelines.files import StudioError, why
-from pipelines.resources import StudioFolder
+from pipelines.studio.folder import existing
 
 
 def serve(root: Path, *, host: str, port: int) -> int:
@@ -26,12 +26,17 @@ def serve(root: Path, *, host: str, port: int) -> int:
         [sys.executable, "-m", "dagster_webserver", "-h", host, "-p", str(port), *module],
         [sys.executable, "-m", "dagster._daemon", "run", *module],
     )
-    children = [subprocess.Popen(command, env=environment, cwd=studio.root) for command in commands]
+    children = [
+        subprocess.Popen(command, env=environment, cwd=studio.root, creationflags=processes.GROUP)
+        for command in commands
+    ]
 
     def end(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, end)
+    for number in processes.ENDING:
+        if number == signal.SIGTERM or signal.getsignal(number) != signal.SIG_IGN:  # as nohup leaves it
+            signal.signal(number, end)
     sys.stderr.write(f"odori: the studio {studio.root} is at http://{host}:{port}; stop with Ctrl-C\n")
     try:
         while all(child.poll() is None for child in children):
@@ -40,29 +45,4 @@ def serve(root: Path, *, host: str, port: int) -> int:
     except KeyboardInterrupt:
         return 0
     finally:
-        for child in children:
-            child.terminate()
-        for child in children:
-            try:
-                child.wait(10)
-            except subprocess.TimeoutExpired:
-                child.kill()
-
-
-def existing(root: Path) -> StudioFolder:
-    """Open a studio folder that is there.
-
-    Raises
-    ------
-    StudioError
-        If it is missing or cannot be listed.
-    """
-    try:
-        if not root.is_dir():
-            raise StudioError(
-                f"{root}: want a studio folder with clips/ and songs/ in it, got nothing there; "
-                "name one with --studio or ODORI_STUDIO, or try 'odori demo'"
-            )
-    except OSError as error:
-        raise StudioError(f"{root}: cannot be read: {why(error)}") from error
-    return StudioFolder(root)
+        processes.end(children)

@@ -45,7 +45,8 @@ def check_key(text: str) -> str:
 
 
 def _hash(text: str) -> str:
-    return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    """Hash a name, however its letters are put together: macOS writes ``が`` as two signs, other systems as one."""
+    return hashlib.sha256(unicodedata.normalize("NFC", text).encode("utf-8", "surrogatepass")).hexdigest()[:8]
 
 
 def slug(text: str, *, longest: int = LONGEST_KEY) -> str:
@@ -176,7 +177,7 @@ def part_of(name: str, n_parts: int) -> int:
     -------
     int, 0 to ``n_parts`` - 1
     """
-    return int(hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8], 16) % n_parts
+    return int(_hash(name), 16) % n_parts
 
 
 _PART = re.compile(r"(?P<session>.+)-part_\d+_of_(?P<n_parts>\d+)")
@@ -196,3 +197,23 @@ def parts_in_use(session_keys: Sequence[str]) -> dict[str, int]:
     """
     found = (_PART.fullmatch(key) for key in session_keys)
     return {m["session"]: int(m["n_parts"]) for m in found if m}
+
+
+def base_method(method: str) -> str:
+    """Find the method an alternative is one of: ``graph`` of ``graph_2``.
+
+    Parameters
+    ----------
+    method : str, a method's name, or that of an alternative
+    """
+    return method.partition("_")[0]
+
+
+def alternative_number(method: str) -> int:
+    """Tell which dance of its method: 1 for the best, 2 and on for alternatives.
+
+    Parameters
+    ----------
+    method : str, a method's name, or that of an alternative
+    """
+    return int(method.partition("_")[2] or 1)

@@ -12,7 +12,7 @@ from schemas.options import check, key
 from schemas.pins import PinWish
 
 METHODS = ("graph", "matching", "hmm")
-"""Ways to choose a choreography; the first is the usual one."""
+"""Ways to choose a choreography, each with its file ``assets/dancing/by_<name>.py``; the first is the usual one."""
 
 
 class _Checked:

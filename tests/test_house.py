@@ -42,7 +42,15 @@ def test_package_files_hold_one_docstring_and_no_imports():
 
 # Declarations, plain records and the thinnest glue are tested where they are used.
 TESTED_ELSEWHERE = {
-    "assets/danced.py",  # a record
+    "assets/dancing/method.py",  # records
+    "assets/dancing/match_pieces.py",  # in test_by_matching.py
+    "assets/reading/clips.py",
+    "pipelines/commands/build.py",  # in test_commands.py and test_build.py
+    "pipelines/commands/check.py",
+    "pipelines/commands/dance.py",
+    "pipelines/commands/session.py",
+    "pipelines/studio/folder.py",
+    "assets/dancing/danced.py",  # a record
     "schemas/options.py",  # in test_settings.py
     "assets/capture.py",
     "assets/choreography.py",
@@ -51,9 +59,9 @@ TESTED_ELSEWHERE = {
     "assets/graph.py",
     "assets/matching.py",
     "assets/hmm.py",
-    "assets/hmm_path.py",
-    "assets/hmm_pins.py",  # in tests/pipelines/test_hmm.py
-    "assets/hmm_recordings.py",
+    "assets/dancing/by_hmm.py",
+    "assets/dancing/hmm_wishes.py",  # in tests/pipelines/test_hmm.py
+    "assets/dancing/recordings.py",
     "assets/motion.py",
     "assets/search.py",
     "assets/music.py",
@@ -61,17 +69,16 @@ TESTED_ELSEWHERE = {
     "assets/formats/errors.py",
     "kernels/music/pulse_weights.py",
     "kernels/synthetic/grooves.py",
-    "pipelines/cli.py",
     "pipelines/collection.py",
     "pipelines/freshness.py",
-    "pipelines/hmm_report.py",
+    "pipelines/commands/hmm_report.py",
     "pipelines/io_managers.py",
     "pipelines/jobs.py",
-    "pipelines/outcome.py",
-    "pipelines/progress.py",
+    "pipelines/commands/outcome.py",
+    "pipelines/commands/progress.py",
     "pipelines/resources.py",
     "pipelines/schedules.py",
-    "pipelines/searchable.py",
+    "pipelines/commands/searchable.py",
     "schemas/calibration.py",
     "schemas/choreography.py",
     "schemas/fields.py",
@@ -126,15 +133,20 @@ UNDOCUMENTED = {
         "kernels/graph": "alternatives distance features nodes path pins program",
         "kernels/hmm": "character durations evidence instances model states viterbi",
         "kernels/search": "augment discriminant document encoder fit measure network train",
-        "kernels/motion": "contacts key_poses",
+        "kernels/motion": "key_poses",
+        "kernels/skeleton": "contacts",
         "kernels/music": "percussion",
         "kernels/synthetic": "performance",
         "schemas": "pins",
         "assets/formats": "usd_character",
-        "assets": "characters dance direction graph_memory graph_path hmm_path hmm_plots hmm_tables proposals "
-        "search_plots search_tables stage tables",
-        "pipelines": "build calibrate cli collection commands dancing files freshness hmm_report io_managers jobs lake "
-        "progress resources schedules sensors status web why",
+        "assets": "dance graph_memory stage",
+        "assets/dancing": "by_graph by_hmm characters proposals wishes",
+        "assets/plots": "hmm search",
+        "assets/tables": "hmm pack search",
+        "pipelines": "build cli collection freshness io_managers jobs resources schedules sensors web",
+        "pipelines/studio": "files folder lake",
+        "pipelines/commands": "asked build calibrate check dance dance_report hmm_report progress propose session "
+        "status why",
     }.items()
     for name in names.split()
 }
@@ -195,3 +207,47 @@ def test_documented_parameters_are_those_there_are(path):
         and _documented(text) != _arguments(node)
     }
     assert wrong == {}
+
+
+def _is_text(call):
+    """Whether a call opens, reads or writes a file as text."""
+    name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
+    if name in ("read_text", "write_text"):
+        return True
+    modes = [a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+    modes += [k.value.value for k in call.keywords if k.arg == "mode" and isinstance(k.value, ast.Constant)]
+    return name == "open" and not any("b" in mode for mode in modes)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(REPOSITORY)))
+def test_text_files_are_utf8_on_every_system(path):
+    """What an encoding is left out for is written in that of the system: cp1252 on Windows."""
+    calls = [
+        n for n in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(n, ast.Call) and _is_text(n)
+    ]
+    unsaid = [
+        ast.unparse(call)
+        for call in calls
+        if not any(k.arg == "encoding" for k in call.keywords)
+        and not any(isinstance(a, ast.Constant) and str(a.value).startswith("utf-8") for a in call.args)
+    ]
+    assert unsaid == []
+
+
+POSIX_ALONE = {"fcntl", "grp", "posix", "pwd", "resource", "termios", "tty"}
+POSIX_CALLS = {"os.kill", "os.killpg", "os.getuid", "os.fork", "os.uname", "os.name", "sys.platform", "signal.SIGKILL"}
+ONE_PLACE = {"assets/formats/file_names.py", "pipelines/caches.py"}  # names of files; the user's cache folder
+WITHOUT_TOO = {"kernels/opencl/pocl_target.py", "pipelines/devices.py"}  # what Linux tells of the processor, or nothing
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(REPOSITORY)))
+def test_systems_are_told_apart_in_one_place_and_nothing_is_of_one_alone(path):
+    name = path.relative_to(REPOSITORY).as_posix()
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    modules = {alias.name.split(".")[0] for n in nodes if isinstance(n, ast.Import) for alias in n.names}
+    modules |= {n.module.split(".")[0] for n in nodes if isinstance(n, ast.ImportFrom) and n.module}
+    assert not modules & POSIX_ALONE
+    used = {ast.unparse(n) for n in nodes if isinstance(n, ast.Attribute)}
+    assert not used & POSIX_CALLS or name in ONE_PLACE
+    texts = {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    assert not any(text.startswith("/proc") for text in texts) or name in WITHOUT_TOO

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,6 +12,21 @@ from typing import Any
 
 MARK = ".tmp-"
 """How the name of a file begins that is not finished: hidden, and never what anybody else writes."""
+
+
+# What Windows says of a file that another program holds open: access denied, sharing violation, mapped.
+_HELD = (5, 32, 1224)
+_PATIENCE_S = 2.0
+
+
+def is_held(error: OSError) -> bool:
+    """Whether another program holds the file open, which only Windows minds.
+
+    Parameters
+    ----------
+    error : as the system raised it
+    """
+    return getattr(error, "winerror", None) in _HELD
 
 
 @contextmanager
@@ -39,11 +55,24 @@ def written_beside(path: Any, *, suffix: str = "") -> Iterator[Any]:  # noqa: AN
         if isinstance(path, Path):
             with partial.open("r+b") as file:
                 os.fsync(file.fileno())
-        partial.replace(path) if isinstance(path, Path) else partial.rename(path)
+        _put(partial, path)
     finally:
         # Where even the folder is none, there is nothing to remove.
         with suppress(OSError):
             partial.unlink()
+
+
+def _put(partial: Any, path: Any) -> None:  # noqa: ANN401 - pathlib or universal path
+    """Rename a file over another; one that a reader holds open for a moment is waited for."""
+    deadline_s = time.monotonic() + _PATIENCE_S
+    while True:
+        try:
+            partial.replace(path) if isinstance(path, Path) else partial.rename(path)
+            return
+        except OSError as error:
+            if not is_held(error) or time.monotonic() > deadline_s:
+                raise
+        time.sleep(0.05)
 
 
 def sweep(folder: Any) -> int:  # noqa: ANN401 - pathlib or universal path

@@ -6,6 +6,7 @@ import csv
 import difflib
 import io
 import math
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -61,7 +62,8 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
     Returns
     -------
     dict
-        From the file as written, with ``/`` between folders, to its facts. Empty when there are no rows.
+        From the file as written, with ``/`` between folders and accents put together, to its facts. Empty when there
+        are no rows.
 
     Raises
     ------
@@ -83,7 +85,7 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
             )
         facts: dict[str, Facts] = {}
         for row in rows:
-            file = (row.get(chosen["file"]) or "").strip().replace("\\", "/")
+            file = _composed((row.get(chosen["file"]) or "").strip().replace("\\", "/"))
             if not file:
                 continue
             texts: dict[str, Any] = {k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"}
@@ -94,6 +96,11 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
     except csv.Error as error:
         raise FormatError(path, rows.line_num, f"want comma-separated values, got {error}") from error
     return facts
+
+
+def _composed(name: str) -> str:
+    """Put accents and their letters together: some disks of macOS keep them apart, tables do not."""
+    return unicodedata.normalize("NFC", name)
 
 
 def _seconds(text: str, path: str, line: int) -> float:
@@ -142,11 +149,11 @@ def row_of(facts: Mapping[str, Facts], folders: Sequence[str], name: str) -> str
     str or None
         The file as the row writes it; None when no row names it.
     """
-    parts = [*folders, name]
+    parts = [_composed(part) for part in (*folders, name)]
     for start in range(len(parts)):
         ending = "/".join(parts[start:])
         if ending in facts:
             return ending
     # A row may also carry folders the studio does not have: data sets list their files from their own root.
-    endings = [key for key in facts if key.rsplit("/", 1)[-1] == name]
+    endings = [key for key in facts if key.rsplit("/", 1)[-1] == parts[-1]]
     return endings[0] if len(endings) == 1 else None

@@ -158,11 +158,16 @@ def remove_others(folder: Path, kept: Mapping[str, str]) -> None:
     Raises
     ------
     OSError
-        If a file cannot be removed; one that is gone already is no error.
+        If a file cannot be removed; one that is gone already is no error, and one that a search has mapped, on Windows,
+        is left to the next time.
     """
     for path in folder.glob("*-*.*"):
         if path.suffix in (".f32", ".usearch") and path.name not in kept.values():
-            path.unlink(missing_ok=True)
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                if not beside.is_held(error):
+                    raise
 
 
 def _write_graph(folder: Path, rows: pa.Table, vector: Vectors) -> dict[str, str]:

@@ -52,8 +52,14 @@ class File:
         return "." + self.name.rsplit(".", 1)[1].lower() if "." in self.name else ""
 
 
+LEFT_BY_WINDOWS = ("desktop.ini", "thumbs.db", "ehthumbs.db")
+"""Files of Windows itself; those of macOS begin with a dot."""
+
+
 def walk(root: Path, notes: list[str] | None = None) -> list[File]:
-    """List the files under a folder, following links but no loop; hidden names and what is no file are left out.
+    """List the files under a folder, following links but no loop.
+
+    Hidden names, what is no file, and what Windows leaves in folders that a person looked at are left out.
 
     Parameters
     ----------
@@ -83,7 +89,7 @@ def _walk(root: Path, folder: Path, prefix: str, seen: frozenset[tuple[int, int]
     if identity in seen:
         return
     for entry in entries:
-        if entry.name.startswith("."):
+        if entry.name.startswith(".") or entry.name.lower() in LEFT_BY_WINDOWS:
             continue
         try:
             if entry.is_dir():
@@ -164,5 +170,5 @@ class HashCache:
             return
         with suppress(OSError):
             with written_beside(self._store) as partial:
-                partial.write_text(json.dumps(self._known, sort_keys=True))
+                partial.write_text(json.dumps(self._known, sort_keys=True), encoding="utf-8")
             self._is_changed = False

@@ -13,7 +13,7 @@ import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PureWindowsPath
 
 import numpy as np
 from pxr import Ar, Gf, Sdf, Tf, Usd, UsdGeom, UsdSkel, Vt
@@ -439,19 +439,20 @@ def flat_copy(path: str | Path) -> Copy:
                 continue
             data = _bytes(value.resolvedPath)
             if data is None:
-                spec.default = Sdf.AssetPath(f"./{_legal(PurePosixPath(value.path).name)}")
+                spec.default = Sdf.AssetPath(f"./{_legal(value.path)}")
                 continue
             if value.resolvedPath not in names:
                 inner = value.resolvedPath.rstrip("]").replace("[", "/")
-                names[value.resolvedPath] = f"textures/{len(names)}_{_legal(PurePosixPath(inner).name)}"
+                names[value.resolvedPath] = f"textures/{len(names)}_{_legal(inner)}"
                 files[names[value.resolvedPath]] = data
             spec.default = Sdf.AssetPath(f"./{names[value.resolvedPath]}")
     layer.documentation = ""
     return Copy(layer, files)
 
 
-def _legal(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9._-]", "_", name)
+def _legal(path: str) -> str:
+    """Name the file of a path of any system, in letters that every system takes."""
+    return re.sub(r"[^A-Za-z0-9._-]", "_", PureWindowsPath(path).name)
 
 
 def _bytes(resolved: str) -> bytes | None:

@@ -12,8 +12,8 @@ from kernels import rotation
 from kernels.assembly.joins import PROBE_S, SHAPES, Side, ease
 from kernels.assembly.stance import clip_contacts, meet, planted_share
 from kernels.assembly.timing import clock
-from kernels.motion.contacts import FootContacts
 from kernels.skeleton import kinematics
+from kernels.skeleton.contacts import FootContacts
 from kernels.types import Choreography, Clip, Float, Int, Skeleton
 
 

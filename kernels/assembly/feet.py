@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from kernels import rotation
 from kernels.assembly.blend import Dance
 from kernels.assembly.stance import clip_contacts
-from kernels.motion.contacts import FootContacts, runs
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.alignment import unit
 from kernels.skeleton.canonical import CANONICAL
+from kernels.skeleton.contacts import FootContacts, runs
 from kernels.types import Choreography, Clip, Float
 
 Bool = NDArray[np.bool_]

@@ -13,10 +13,9 @@ from kernels.assembly.feet import planted_feet
 from kernels.assembly.quality import Measure
 from kernels.assembly.seam_quality import phrases_alone
 from kernels.assembly.stance import clip_contacts
-from kernels.motion import contacts
-from kernels.motion.contacts import FootContacts
-from kernels.skeleton import grounding, kinematics
+from kernels.skeleton import contacts, grounding, kinematics
 from kernels.skeleton.canonical import CANONICAL
+from kernels.skeleton.contacts import FootContacts
 from kernels.types import Choreography, Clip, Float
 
 Bool = NDArray[np.bool_]

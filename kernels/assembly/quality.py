@@ -15,6 +15,7 @@ from kernels.assembly.blend import Dance
 from kernels.motion.velocity import kinematic_beats, speed_between
 from kernels.ranks import rank_correlation
 from kernels.types import Choreography, Float
+from kernels.warp import EASY_WARP, HARD_WARP
 
 
 @dataclass(frozen=True)
@@ -217,14 +218,15 @@ def warp_measures(steps: Choreography) -> list[Measure]:
     """
     warp = steps.warp_ratio
     easy, least, most = (
-        float(np.mean((warp >= 0.90 - _SLACK) & (warp <= 1.10 + _SLACK))),
+        float(np.mean((warp >= EASY_WARP[0] - _SLACK) & (warp <= EASY_WARP[1] + _SLACK))),
         float(warp.min()),
         float(warp.max()),
     )
+    within = f"{EASY_WARP[0]:.2f} to {EASY_WARP[1]:.2f}"
     return [
-        Measure("warp_easy_ratio", easy, "at least 0.95 of steps within 0.90 to 1.10", easy >= 0.95),
-        Measure("warp_least_ratio", least, "never below 0.80", least >= 0.80 - _SLACK),
-        Measure("warp_most_ratio", most, "never above 1.25", most <= 1.25 + _SLACK),
+        Measure("warp_easy_ratio", easy, f"at least 0.95 of steps within {within}", easy >= 0.95),
+        Measure("warp_least_ratio", least, f"never below {HARD_WARP[0]:.2f}", least >= HARD_WARP[0] - _SLACK),
+        Measure("warp_most_ratio", most, f"never above {HARD_WARP[1]:.2f}", most <= HARD_WARP[1] + _SLACK),
     ]
 
 

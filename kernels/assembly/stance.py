@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.motion.contacts import FootContacts, find_contacts
 from kernels.skeleton import grounding
+from kernels.skeleton.contacts import FootContacts, find_contacts
 from kernels.types import Clip, Float
 
 HEADING_WEIGHT = 0.05

@@ -11,6 +11,8 @@ from kernels.calibration.joints import PairSolution, solve_joints
 from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, JointEstimate
 from kernels.types import Float
 
+_DECIMALS = 8  # of metres: a thousandth of the smallest error on a recording without noise
+
 
 def calibrate(cleaned: Cleaned, *, has_adjustment: bool = True) -> Calibration:
     """Find the joints of a body from its sensors.
@@ -42,6 +44,8 @@ def calibrate(cleaned: Cleaned, *, has_adjustment: bool = True) -> Calibration:
     else:
         in_parent = np.stack([pair.in_parent_m for pair in pairs])
         in_child = np.stack([pair.in_child_m for pair in pairs])
+    # what linear algebra leaves at 1e-15 m is the processor's own, and would show in all poses made from it
+    in_parent, in_child = np.round(in_parent, _DECIMALS), np.round(in_child, _DECIMALS)
     length = bone_lengths(in_parent, in_child)
     joints = tuple(
         _estimate(name, pair, in_parent[k], in_child[k], float(length[k]))

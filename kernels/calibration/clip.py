@@ -8,6 +8,7 @@ second of the recording, turned to face +Z. Recordings come in any world; which 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,8 +74,7 @@ def find_gauge(poses: Poses, frame_rate_hz: float) -> Gauge:
     first, end = _rest_window(poses, up, frame_rate_hz)
     middle = rotation.mul(turn, _mean(rotation.continuous(poses.rotation_wxyz[first:end])))
     left = rotation.apply(turn, np.mean(p[first:end, at["l_thigh"]] - p[first:end, at["r_thigh"]], axis=0))
-    ahead = rotation.from_heading(np.arctan2(left[2], left[0]))  # brings the hip line to +X, so the body faces +Z
-    return Gauge(turn, first, end, rotation.mul(ahead, middle))
+    return Gauge(turn, first, end, rotation.mul(_ahead(float(left[0]), float(left[2])), middle))
 
 
 def to_clip(poses: Poses, frame_rate_hz: float, *, gauge: Gauge | None = None) -> Clip:
@@ -143,6 +143,15 @@ def _rest_window(poses: Poses, up: Float, frame_rate_hz: float) -> tuple[int, in
     total = np.concatenate([[0.0], np.cumsum(cost)])
     first = int(np.argmin(total[width:] - total[:-width]))
     return first, first + width
+
+
+def _ahead(x: float, z: float) -> Float:
+    """Turn about the vertical that brings a hip line along (x, z) to +X, so that the body faces +Z."""
+    # by half angles: sines and arc tangents have last bits of the processor's own
+    length = math.sqrt(x * x + z * z)
+    w, y = (length + x, z) if x >= 0 else (abs(z), math.copysign(length - x, z))
+    whole = math.sqrt(w * w + y * y)
+    return np.array([w / whole, 0.0, y / whole, 0.0]) if whole > 0 else rotation.IDENTITY
 
 
 def _mean(rotation_wxyz: Float) -> Float:

@@ -7,19 +7,20 @@ it oscillates at few iterations and never quite closes; :mod:`kernels.calibratio
 
 Conventions
 -----------
-As :mod:`kernels.calibration.tree_solver`. Bones are rigid bodies of mass 1 about the mean of their joints. Turns are
-applied as the unit quaternion along (1, w / 2), so that no step needs more than square roots and divisions, and the
-serial and the parallel run agree bit for bit.
+As :mod:`kernels.calibration.tree_solver`, and like it computed by :mod:`kernels.calibration.components`. Bones are
+rigid bodies of mass 1 about the mean of their joints. Turns are applied as the unit quaternion along (1, w / 2), so
+that no step needs more than square roots and divisions, and the serial and the parallel run agree bit for bit.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from kernels import rotation
-from kernels.calibration.tree_solver import BodyModel, Solved, Stream, check_stream
+from kernels.calibration.components import Quaternion, Vector, add, carry, cross, scale, subtract, turn
+from kernels.calibration.tree_solver import BodyModel, Sensor, Solved, Stream, check_stream, in_portions
 from kernels.types import Float
 
 JOINT_STIFFNESS = 0.25
@@ -74,7 +75,7 @@ def spring_body(model: BodyModel) -> SpringBody:
             points = [np.zeros(3), model.sensor_m[s]]
         centre[s] = np.mean(points, axis=0)
         length = 2 * max(float(np.sqrt(np.sum((point - centre[s]) ** 2))) for point in points)
-        turnability[s] = 1.0 / max(0.5 * length**2, _LEAST_INERTIA)
+        turnability[s] = 1.0 / max(0.5 * (length * length), _LEAST_INERTIA)
     attachment = np.zeros((n, 3))
     attachment[1:] = model.offset_m[1:] - centre[list(model.parent[1:])]
     return SpringBody(-centre, model.sensor_m - centre, attachment, turnability, hold)
@@ -102,31 +103,39 @@ def relax_springs(model: BodyModel, stream: Stream, *, iterations: int = 30) -> 
     """
     check_stream(model, stream, iterations)
     body = spring_body(model)
-    n, child = len(model.parent), np.arange(1, len(model.parent))
-    above = np.array(model.parent[1:])
-    q = np.array(stream.rotation_wxyz, np.float64)
-    x = stream.position_xyz_m - rotation.apply(q, body.sensor_m)
-    v, w = np.zeros_like(x), np.zeros_like(x)
+    return in_portions(stream, lambda sensors: _relax(body, model.parent, sensors, iterations))
+
+
+def _relax(
+    body: SpringBody, parent: tuple[int, ...], sensors: list[Sensor], iterations: int
+) -> tuple[list[Vector], list[Quaternion]]:
+    """Places and rotations of the bones; forces are summed in the order of :func:`relax_frame`."""
+    bones = range(len(parent))
+    proximal, sensor, attachment = body.proximal_m.tolist(), body.sensor_m.tolist(), body.attachment_m.tolist()
+    turnability, hold = body.turnability.tolist(), body.hold.tolist()
+    q = [one.said for one in sensors]
+    x = [subtract(sensors[s].at, carry(q[s], sensor[s])) for s in bones]
+    still = np.zeros_like(x[0][0])
+    v: list[Vector] = [(still, still, still) for s in bones]
+    w = v.copy()
     for _ in range(iterations):
-        force, torque = np.zeros_like(x), np.zeros_like(x)
-        own = rotation.apply(q[:, child], body.proximal_m[1:])
-        on_parent = rotation.apply(q[:, above], body.attachment_m[1:])
-        pull = JOINT_STIFFNESS * ((x[:, above] + on_parent) - (x[:, child] + own))
-        for s in range(n):  # in the order of the literal loop, so that sums have the same bits
-            lever = rotation.apply(q[:, s], body.sensor_m[s])
-            held = body.hold[s] * (stream.position_xyz_m[:, s] - (x[:, s] + lever))
-            force[:, s] += held
-            torque[:, s] += _cross(lever, held)
-        for k, (c, p) in enumerate(zip(child, above, strict=True)):
-            force[:, c] += pull[:, k]
-            torque[:, c] += _cross(own[:, k], pull[:, k])
-            force[:, p] -= pull[:, k]
-            torque[:, p] -= _cross(on_parent[:, k], pull[:, k])
-        v = KEPT_SPEED * (v + force)
-        w = KEPT_SPEED * (w + torque * body.turnability[:, None])
-        x = x + v
-        q = _turned(q, w)
-    return Solved(x + rotation.apply(q, body.proximal_m), q)
+        force, torque = [], []
+        for s in bones:
+            lever = carry(q[s], sensor[s])
+            held = scale(hold[s], subtract(sensors[s].at, add(x[s], lever)))
+            force.append(held)
+            torque.append(cross(lever, held))
+        for c in bones[1:]:
+            p = parent[c]
+            own, on_parent = carry(q[c], proximal[c]), carry(q[p], attachment[c])
+            pull = scale(JOINT_STIFFNESS, subtract(add(x[p], on_parent), add(x[c], own)))
+            force[c], torque[c] = add(force[c], pull), add(torque[c], cross(own, pull))
+            force[p], torque[p] = subtract(force[p], pull), subtract(torque[p], cross(on_parent, pull))
+        for s in bones:
+            v[s] = scale(KEPT_SPEED, add(v[s], force[s]))
+            w[s] = scale(KEPT_SPEED, add(w[s], scale(turnability[s], torque[s])))
+            x[s], q[s] = add(x[s], v[s]), turn(q[s], w[s])
+    return [add(x[s], carry(q[s], proximal[s])) for s in bones], q
 
 
 def relax_frame(
@@ -156,18 +165,19 @@ def relax_frame(
     n = len(parent)
     proximal, sensor = body.proximal_m.tolist(), body.sensor_m.tolist()
     attachment, turnability, hold = body.attachment_m.tolist(), body.turnability.tolist(), body.hold.tolist()
+    at = [[one[i] - position_xyz_m[0][i] for i in range(3)] for one in position_xyz_m]
     q = [list(one) for one in rotation_wxyz]
     x = []
     for s in range(n):
         a = _carry(q[s], sensor[s])
-        x.append([position_xyz_m[s][i] - a[i] for i in range(3)])
+        x.append([at[s][i] - a[i] for i in range(3)])
     v, w = [[0.0] * 3 for _ in range(n)], [[0.0] * 3 for _ in range(n)]
     for _ in range(iterations):
         force, torque = [[0.0] * 3 for _ in range(n)], [[0.0] * 3 for _ in range(n)]
         for s in range(n):
             a = _carry(q[s], sensor[s])
-            f = [hold[s] * (position_xyz_m[s][i] - (x[s][i] + a[i])) for i in range(3)]
-            t = _cross_list(a, f)
+            f = [hold[s] * (at[s][i] - (x[s][i] + a[i])) for i in range(3)]
+            t = _cross(a, f)
             for i in range(3):
                 force[s][i] += f[i]
                 torque[s][i] += t[i]
@@ -175,7 +185,7 @@ def relax_frame(
             p = parent[c]
             a, b = _carry(q[c], proximal[c]), _carry(q[p], attachment[c])
             f = [JOINT_STIFFNESS * ((x[p][i] + b[i]) - (x[c][i] + a[i])) for i in range(3)]
-            t, u = _cross_list(a, f), _cross_list(b, f)
+            t, u = _cross(a, f), _cross(b, f)
             for i in range(3):
                 force[c][i] += f[i]
                 torque[c][i] += t[i]
@@ -186,33 +196,12 @@ def relax_frame(
                 v[s][i] = KEPT_SPEED * (v[s][i] + force[s][i])
                 w[s][i] = KEPT_SPEED * (w[s][i] + torque[s][i] * turnability[s])
                 x[s][i] += v[s][i]
-            q[s] = _turned_list(q[s], w[s])
+            q[s] = _turned(q[s], w[s])
     place = []
     for s in range(n):
         a = _carry(q[s], proximal[s])
-        place.append([x[s][i] + a[i] for i in range(3)])
+        place.append([x[s][i] + a[i] + position_xyz_m[0][i] for i in range(3)])
     return place, q
-
-
-def _cross(a: Float, b: Float) -> Float:
-    return np.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
-
-
-def _turned(q: Float, w: Float) -> Float:
-    """Left product with (1, w / 2), at length one."""
-    x, y, z = 0.5 * w[..., 0], 0.5 * w[..., 1], 0.5 * w[..., 2]
-    a, b, c, d = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
-    e, f = a - x * b - y * c - z * d, b + x * a + y * d - z * c
-    g, h = c - x * d + y * a + z * b, d + x * c - y * b + z * a
-    length = np.sqrt(e * e + f * f + g * g + h * h)
-    return np.stack([e / length, f / length, g / length, h / length], axis=-1)
 
 
 def _carry(q: list[float], v: list[float]) -> list[float]:
@@ -222,14 +211,14 @@ def _carry(q: list[float], v: list[float]) -> list[float]:
     return [a + w * tx + (y * tz - z * ty), b + w * ty + (z * tx - x * tz), c + w * tz + (x * ty - y * tx)]
 
 
-def _cross_list(a: list[float], b: list[float]) -> list[float]:
+def _cross(a: list[float], b: list[float]) -> list[float]:
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
-def _turned_list(q: list[float], w: list[float]) -> list[float]:
+def _turned(q: list[float], w: list[float]) -> list[float]:
     x, y, z = 0.5 * w[0], 0.5 * w[1], 0.5 * w[2]
     a, b, c, d = q
     e, f = a - x * b - y * c - z * d, b + x * a + y * d - z * c
     g, h = c - x * d + y * a + z * b, d + x * c - y * b + z * a
-    length = (e * e + f * f + g * g + h * h) ** 0.5
+    length = math.sqrt(e * e + f * f + g * g + h * h)
     return [e / length, f / length, g / length, h / length]

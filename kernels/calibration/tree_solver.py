@@ -4,17 +4,37 @@ Conventions
 -----------
 Axes: ``F`` frames, ``S`` the 17 segments, parents first. A bone's frame is its sensor's, its origin its proximal joint;
 the pelvis's origin is its sensor. Unknown are the root's position and the 17 world rotations, so joints are closed by
-construction. Left increments: ``R <- exp(dt) R``.
+construction. Left increments: ``R <- exp(dt) R``. Everything is computed by :mod:`kernels.calibration.components`, all
+frames of a portion side by side, so the answer has the same bits on every processor and on a device.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from kernels import rotation
+from kernels.calibration.components import (
+    Matrix,
+    Quaternion,
+    Symmetric,
+    Vector,
+    add,
+    carry,
+    cross,
+    dot,
+    factor,
+    join,
+    quaternions,
+    rotation_between,
+    scale,
+    solve,
+    subtract,
+    turn,
+    vectors,
+)
 from kernels.calibration.records import PARENT, SENSORS
 from kernels.types import Float
 
@@ -30,6 +50,9 @@ ROTATION_SIGMA_RAD = float(np.radians(1.5))
 
 KINDNESS = 16.0
 """Squared residual, in variances, at which a measurement's weight falls to a quarter from the second step on."""
+
+_UNIT_M = 0.005  # variances are given in this, so that float32 works near 1
+_PORTION = 4096  # frames at a time, so that what a step needs stays in the cache; changes no bit
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +161,28 @@ def check_stream(model: BodyModel, stream: Stream, iterations: int) -> None:
         raise ValueError(f"iterations: want at least 1, got {iterations}")
 
 
+def body_rows(model: BodyModel) -> Float:
+    """Write a body as the solver and its twin read it.
+
+    Parameters
+    ----------
+    model : BodyModel
+
+    Returns
+    -------
+    (S, 11) float64
+        Sensor in its bone's frame (3), proximal joint in the parent's (3), both in metres; one over the variance of
+        positions and of rotations, in units of 5 mm; what damps a turn; what squared residuals, of positions in metres
+        and of rotations in radians, are multiplied with for the weight after Geman and McClure.
+    """
+    apart, turned = _UNIT_M / model.position_sigma_m, _UNIT_M / model.rotation_sigma_rad
+    per_variance = np.stack([apart * apart, turned * turned], axis=1)
+    kindness = per_variance / (3.0 * KINDNESS * (_UNIT_M * _UNIT_M))
+    return np.concatenate(
+        [model.sensor_m, model.offset_m, per_variance, DAMPING * per_variance[:, 1:], kindness], axis=1
+    )
+
+
 def solve_tree(model: BodyModel, stream: Stream, *, iterations: int = 2) -> Solved:
     """Fit a jointed body to its sensors, frame by frame.
 
@@ -160,88 +205,174 @@ def solve_tree(model: BodyModel, stream: Stream, *, iterations: int = 2) -> Solv
 
     Notes
     -----
-    Each step eliminates the bones from the leaves to the root, 3 x 3 by 3 x 3, and goes back. The rotation residual is
-    twice the vector part of the quaternion, lengthened by the series of the arcsine to third order: the rotation vector
-    to 1e-3 up to 60 degrees. The increment is the unit quaternion along (1, dt / 2).
+    Each step eliminates the bones from the leaves to the root, 3 x 3 by 3 x 3, and goes back. Positions are taken from
+    each frame's pelvis sensor first, so that accuracy does not depend on where in the world the body is.
     """
     check_stream(model, stream, iterations)
-    n = len(model.parent)
-    measured = np.moveaxis(stream.position_xyz_m, 1, 0)
-    said = np.moveaxis(stream.rotation_wxyz, 1, 0)
-    q = said.copy()
-    root = measured[0].copy()
-    weight = np.moveaxis(stream.weight, 1, 0)
+    body = body_rows(model).tolist()
+    return in_portions(stream, lambda sensors: _fit(model.parent, body, sensors, iterations))
+
+
+class Sensor(NamedTuple):
+    """What one sensor said in all frames: place from the origin, rotation, and how far it is believed."""
+
+    at: Vector
+    said: Quaternion
+    belief: Float
+
+
+def in_portions(stream: Stream, solve_some: Callable[[list[Sensor]], tuple[list[Vector], list[Quaternion]]]) -> Solved:
+    """Hand a stream to a solver by components, some thousand frames at a time.
+
+    Parameters
+    ----------
+    stream : Stream of F frames
+    solve_some : callable
+        From the S sensors, their places taken from the first one's, to places and rotations of the bones.
+
+    Returns
+    -------
+    Solved
+        Empty where F is 0.
+    """
+    origin = stream.position_xyz_m[:, :1]
+    position, turned = np.zeros_like(stream.position_xyz_m), np.zeros_like(stream.rotation_wxyz)
+    for first in range(0, len(origin), _PORTION):
+        some = slice(first, first + _PORTION)
+        at, said = vectors(stream.position_xyz_m[some] - origin[some]), quaternions(stream.rotation_wxyz[some])
+        belief = np.ascontiguousarray(stream.weight[some].T)
+        place, q = solve_some([Sensor(*one) for one in zip(at, said, belief, strict=True)])
+        position[some], turned[some] = join(place), join(q)
+    return Solved(position + origin, turned)
+
+
+class _Equations(NamedTuple):
+    """What a bone and all below it want of its joint's movement dp and turn dt: A dp + B dt = g, B^T dp + C dt = h."""
+
+    A: Symmetric
+    B: Matrix
+    C: Symmetric
+    g: Vector
+    h: Vector
+
+
+def _fit(
+    parent: tuple[int, ...], body: list[list[float]], sensors: list[Sensor], iterations: int
+) -> tuple[list[Vector], list[Quaternion]]:
+    """Take the steps: places and rotations of the bones."""
+    q = [sensor.said for sensor in sensors]
+    root = sensors[0].at
     for step in range(iterations):
-        R = rotation.to_matrix(q)
-        arm = [R[s] @ model.sensor_m[s] for s in range(n)]
-        bone = [R[s if s == 0 else model.parent[s]] @ model.offset_m[s] for s in range(n)]
-        p = _hang(model, root, bone)
-        # of what hangs below each bone: its pull on the joint, and what the joint's movement gives the bone's turn
-        K, g, X = np.zeros((n, len(root), 3, 3)), np.zeros((n, len(root), 3)), np.zeros((n, len(root), 3, 4))
-        for s in reversed(range(n)):
-            r = measured[s] - p[s] - arm[s]
-            phi = _rotation_residual(q[s], said[s])
-            wp = weight[s] / model.position_sigma_m[s] ** 2
-            wr = weight[s] / model.rotation_sigma_rad[s] ** 2
-            if step > 0:
-                wp = wp * _kind(r, model.position_sigma_m[s])
-                wr = wr * _kind(phi, model.rotation_sigma_rad[s])
-            D = _cross_matrix(arm[s])
-            eye = np.eye(3) * wp[:, None, None]
-            damped = wr + DAMPING / model.rotation_sigma_rad[s] ** 2
-            A_s, B_s = eye, -wp[:, None, None] * D
-            C_s = wp[:, None, None] * (D.mT @ D) + damped[:, None, None] * np.eye(3)
-            g_s = wp[:, None] * r
-            h_s = -np.matvec(D.mT, g_s) + wr[:, None] * phi
-            for c in range(s + 1, n):
-                if model.parent[c] == s:
-                    D = _cross_matrix(bone[c])
-                    KD = K[c] @ D
-                    A_s, B_s, C_s = A_s + K[c], B_s - KD, C_s + D.mT @ KD
-                    g_s, h_s = g_s + g[c], h_s - np.matvec(D.mT, g[c])
-            X[s] = np.linalg.solve(C_s, np.concatenate([B_s.mT, h_s[..., None]], axis=-1))
-            K[s] = A_s - B_s @ X[s][..., :3]
-            g[s] = g_s - np.matvec(B_s, X[s][..., 3])
-        dp = np.zeros((n, *root.shape))
-        dp[0] = np.linalg.solve(K[0], g[0][..., None])[..., 0]
-        turned = np.zeros((n, *root.shape))
-        for s in range(n):
-            if s > 0:
-                above = model.parent[s]
-                dp[s] = dp[above] + np.cross(turned[above], bone[s])
-            turned[s] = X[s][..., 3] - np.matvec(X[s][..., :3], dp[s])
-        q = rotation.normalize(rotation.mul(np.concatenate([np.ones((*turned.shape[:-1], 1)), turned / 2], -1), q))
-        root = root + dp[0]
-    R = rotation.to_matrix(q)
-    bone = [R[s if s == 0 else model.parent[s]] @ model.offset_m[s] for s in range(n)]
-    return Solved(np.stack(_hang(model, root, bone), axis=1), np.moveaxis(q, 0, 1))
+        bone, place = _hang(parent, body, root, q)
+        equations = [_weigh(sensors[s], q[s], place[s], body[s], is_first=step == 0) for s in range(len(parent))]
+        moved, turned = _least_squares(parent, bone, equations)
+        q = [turn(q[s], turned[s]) for s in range(len(parent))]
+        root = add(root, moved)
+    return _hang(parent, body, root, q)[1], q
 
 
-def _hang(model: BodyModel, root: Float, bone: list[Float]) -> list[Float]:
-    p = [root]
-    for s in range(1, len(model.parent)):
-        p.append(p[model.parent[s]] + bone[s])
-    return p
+def _hang(
+    parent: tuple[int, ...], body: list[list[float]], root: Vector, q: list[Quaternion]
+) -> tuple[list[Vector], list[Vector]]:
+    """Ways from the parent's origin to each bone's, the root's of no meaning, and places of the origins."""
+    bone, place = [root], [root]
+    for s in range(1, len(parent)):
+        bone.append(carry(q[parent[s]], body[s][3:6]))
+        place.append(add(place[parent[s]], bone[s]))
+    return bone, place
 
 
-def _rotation_residual(q: Float, said: Float) -> Float:
-    """Rotation vector from ``q`` to what was said, in the world."""
-    apart = rotation.mul(said, rotation.inv(q))
-    v = apart[..., 1:] * np.where(apart[..., :1] < 0, -2.0, 2.0)
-    square = 0.25 * np.sum(v * v, axis=-1, keepdims=True)
-    phi: Float = v * (1.0 + square * (1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0))))
-    return phi
+def _weigh(sensor: Sensor, q: Quaternion, place: Vector, row: list[float], *, is_first: bool) -> _Equations:
+    """Set up what a bone's own sensor wants of it."""
+    per_place, per_turn, damping, kind_place, kind_turn = row[6:]
+    arm = carry(q, row[:3])
+    r = subtract(subtract(sensor.at, place), arm)
+    phi = rotation_between(q, sensor.said)
+    wp, wr = sensor.belief * per_place, sensor.belief * per_turn
+    if not is_first:
+        up, ur = 1.0 + dot(r, r) * kind_place, 1.0 + dot(phi, phi) * kind_turn
+        wp, wr = wp / (up * up), wr / (ur * ur)
+    x, y, z = arm
+    wx, wy, wz = scale(wp, arm)
+    damped = wr + damping
+    zero = np.zeros_like(wp)
+    return _Equations(
+        (wp, zero, zero, wp, zero, wp),
+        ((zero, wz, -wy), (-wz, zero, wx), (wy, -wx, zero)),
+        (
+            wp * (y * y + z * z) + damped,
+            -(wx * y),
+            -(wx * z),
+            wp * (x * x + z * z) + damped,
+            -(wy * z),
+            wp * (x * x + y * y) + damped,
+        ),
+        scale(wp, r),
+        add(cross((wx, wy, wz), r), scale(wr, phi)),
+    )
 
 
-def _kind(residual: Float, sigma: float) -> Float:
-    """Geman and McClure's weight."""
-    u = np.sum(residual * residual, axis=-1) / (3.0 * sigma**2)
-    weight: Float = 1.0 / (1.0 + u / KINDNESS) ** 2
-    return weight
+def _least_squares(
+    parent: tuple[int, ...], bone: list[Vector], equations: list[_Equations]
+) -> tuple[Vector, list[Vector]]:
+    """Solve for the root's movement and the turns of all: from the leaves to the root, and back."""
+    n = len(parent)
+    wanted, turns = list(equations), {}
+    for s in reversed(range(n)):
+        turns[s], K, k = _eliminate(wanted[s])
+        if s > 0:
+            wanted[parent[s]] = _with_child(wanted[parent[s]], K, k, bone[s])
+    moved = [solve(factor(K), k)]
+    turned = [_turn_of(turns[0], moved[0])]
+    for s in range(1, n):
+        moved.append(add(moved[parent[s]], cross(turned[parent[s]], bone[s])))
+        turned.append(_turn_of(turns[s], moved[s]))
+    return moved[0], turned
 
 
-def _cross_matrix(v: Float) -> Float:
-    """[v]x, (..., 3, 3)."""
-    zero = np.zeros(v.shape[:-1])
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*v.shape[:-1], 3, 3)
+class _Turn(NamedTuple):
+    """A bone's turn dt = of_pull - X dp, where dp is its joint's movement; X by its columns."""
+
+    X: Matrix
+    of_pull: Vector
+
+
+def _eliminate(e: _Equations) -> tuple[_Turn, Symmetric, Vector]:
+    """Solve for the bone's turn, and leave its joint's movement: K dp = k."""
+    f = factor(e.C)
+    B0, B1, B2 = e.B
+    X0, X1, X2 = solve(f, B0), solve(f, B1), solve(f, B2)
+    x = solve(f, e.h)
+    K = (
+        e.A[0] - dot(B0, X0),
+        e.A[1] - dot(B0, X1),
+        e.A[2] - dot(B0, X2),
+        e.A[3] - dot(B1, X1),
+        e.A[4] - dot(B1, X2),
+        e.A[5] - dot(B2, X2),
+    )
+    return _Turn((X0, X1, X2), x), K, subtract(e.g, (dot(B0, x), dot(B1, x), dot(B2, x)))
+
+
+def _with_child(e: _Equations, K: Symmetric, k: Vector, bone: Vector) -> _Equations:
+    """Add what a child wants, whose joint moves by dp + dt x bone."""
+    k00, k01, k02, k11, k12, k22 = K
+    W0, W1, W2 = cross((k00, k01, k02), bone), cross((k01, k11, k12), bone), cross((k02, k12, k22), bone)
+    t0, t1, t2 = (cross((W0[i], W1[i], W2[i]), bone) for i in range(3))
+    return _Equations(
+        _sum(e.A, K),
+        (subtract(e.B[0], W0), subtract(e.B[1], W1), subtract(e.B[2], W2)),
+        _sum(e.C, (t0[0], t1[0], t2[0], t1[1], t2[1], t2[2])),
+        add(e.g, k),
+        add(e.h, cross(bone, k)),
+    )
+
+
+def _sum(a: Symmetric, b: Symmetric) -> Symmetric:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+
+
+def _turn_of(way: _Turn, moved: Vector) -> Vector:
+    x, y, z = moved
+    X0, X1, X2 = way.X
+    return subtract(way.of_pull, add(add(scale(x, X0), scale(y, X1)), scale(z, X2)))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kernels.ranks import mean_ranks
 from kernels.types import Float, Int, MotionGraph
+from kernels.warp import EASY_WARP, HARD_WARP
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ class PathCosts:
     warp: float = 0.1
     leaving: float = 8.0
     warp_outside: float = 8.0
-    soft_ratio: tuple[float, float] = (0.90, 1.10)
-    hard_ratio: tuple[float, float] = (0.80, 1.25)
+    soft_ratio: tuple[float, float] = EASY_WARP
+    hard_ratio: tuple[float, float] = HARD_WARP
     last_resort_ratio: tuple[float, float] = (0.4, 2.5)
     stride: float = 0.25
     jump_back: float = 1.0

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from kernels.types import Float, Int
+from kernels.warp import EASY_WARP, HARD_WARP
 
-LEAST_WARP, MOST_WARP = 0.8, 1.25
+LEAST_WARP, MOST_WARP = HARD_WARP
 """Song time over clip time of a motion: never outside."""
 
-EASY_WARP = (0.9, 1.1)
 HARD_LOG = -6.0
 """Beyond the easy bounds a motion counts so much less, natural log: danced only where nothing else fits."""
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.hmm.durations import EASY_WARP
 from kernels.matching.path import viterbi
 from kernels.types import Float, Int
+from kernels.warp import EASY_WARP, stretch_price
 
 HARD_COST = 4.0
 """Added where the pace is beyond the easy bounds: as much as several rough seams."""
@@ -56,7 +56,7 @@ def warp_cost(span_s: Float, motion_s: Float) -> Float:
     """Cost of leaving a motion's own pace: squared, 1 at ten per cent, and more beyond the easy bounds."""
     warp = span_s / motion_s
     easy = (warp >= EASY_WARP[0] - 1e-9) & (warp <= EASY_WARP[1] + 1e-9)
-    return np.asarray((np.log(warp) / np.log(1.1)) ** 2 + np.where(easy, 0.0, HARD_COST), np.float64)
+    return np.asarray(stretch_price(warp) + np.where(easy, 0.0, HARD_COST), np.float64)
 
 
 def shortlist(

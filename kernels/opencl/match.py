@@ -32,13 +32,8 @@ _CANDIDATES = 2**14
 class ClipIndex(Catalogue[Tables]):
     """A catalogue prepared for many songs; made by :meth:`Matcher.index`.
 
-    Holds the clips in host memory, and their tables in device memory where the matcher's budget allows.
-
-    Parameters
-    ----------
-    chunks : sequence of Chunk
-    fiftieths : the scales times 50
-    is_resident : bool, whether tables stay on the device between searches
+    Holds the clips in host memory, and their tables in device memory where the matcher's budget allows: see
+    :class:`kernels.matching.catalogue.Catalogue` for what it is made of.
     """
 
     @property

@@ -24,8 +24,11 @@ class SpringRelaxation:
         From :func:`kernels.opencl.choice.pick_device`; nothing is chosen here.
     parent : indices of the bones' parents, the root's -1
     precision : "single" or "double"
+        In double precision the answer has the reference's bits.
     is_serial : bool
         One work-item goes through all frames: the same bits, for comparison.
+    group : int, > 0
+        Work-items of a work-group; changes no bit.
 
     Raises
     ------
@@ -40,20 +43,23 @@ class SpringRelaxation:
         parent: tuple[int, ...],
         precision: Literal["single", "double"] = "double",
         is_serial: bool = False,
+        group: int = _GROUP,
     ) -> None:
         self.context = context
         self.parent = parent
         self.is_serial = is_serial
+        self._group = group
         self._device = only_device(context)
         self._dtype = real_type(self._device, precision)
         options = {
             "REAL": "double" if precision == "double" else "float",
+            "LANES": 1,
             "S": len(parent),
             "PARENTS": ",".join(str(k) for k in parent),
             "JOINT": JOINT_STIFFNESS,
             "KEPT": KEPT_SPEED,
         }
-        self._program = build(context, ["spring_relaxation.cl"], options)
+        self._program = build(context, ["components.cl", "spring_relaxation.cl"], options)
         self._queue = cl.CommandQueue(context)
 
     @property
@@ -87,7 +93,7 @@ class SpringRelaxation:
         f, n = stream.weight.shape
         if f == 0:
             return Solved(np.zeros((0, n, 3)), np.zeros((0, n, 4)))
-        origin = stream.position_xyz_m[:, :1] if self._dtype == np.float32 else np.zeros((1, 1, 3))
+        origin = stream.position_xyz_m[:, :1]
         springs = spring_body(model)
         body = np.concatenate(
             [
@@ -110,7 +116,7 @@ class SpringRelaxation:
         # its own: threads may share us
         kernel = cl.Kernel(self._program, "spring_relaxation_serial" if self.is_serial else "spring_relaxation")
         kernel.set_args(np.int32(iterations), np.int32(f), *given, place, answer)
-        items, group = ((1,), (1,)) if self.is_serial else ((-(-f // _GROUP) * _GROUP,), (_GROUP,))
+        items, group = ((1,), (1,)) if self.is_serial else ((-(-f // self._group) * self._group,), (self._group,))
         cl.enqueue_nd_range_kernel(self._queue, kernel, items, group)
         position = self._read(place, (3 * n, f)).reshape(f, n, 3) + origin
         return Solved(position, self._read(answer, (4 * n, f)).reshape(f, n, 4))

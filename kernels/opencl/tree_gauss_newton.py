@@ -8,10 +8,9 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.calibration.tree_solver import DAMPING, KINDNESS, BodyModel, Solved, Stream, check_stream
+from kernels.calibration.tree_solver import BodyModel, Solved, Stream, body_rows, check_stream
 from kernels.opencl.device import build, full_name, only_device, real_type
 
-_SCALE_M = 0.005  # variances are given in this, so that float32 works near 1
 _GROUP = 64
 
 
@@ -24,6 +23,10 @@ class TreeGaussNewton:
         From :func:`kernels.opencl.choice.pick_device`; nothing is chosen here.
     parent : indices of the bones' parents, the root's -1
     precision : "single" or "double"
+        In double precision the answer has the reference's bits.
+    lanes : 1, 2, 4, 8 or 16 frames a work-item owns, or None for what suits the device
+    group : int, > 0, work-items of a work-group, or None for what suits the device
+        Neither changes a bit.
 
     Raises
     ------
@@ -32,29 +35,32 @@ class TreeGaussNewton:
 
     Notes
     -----
-    Positions are taken from each frame's pelvis sensor before they become float32, so accuracy does not depend on where
-    in the world the body is. The number of frames a work-item owns follows the device and changes no bit.
+    As in the reference, positions are taken from each frame's pelvis sensor, here before they become float32.
     """
 
     def __init__(
-        self, context: cl.Context, *, parent: tuple[int, ...], precision: Literal["single", "double"] = "single"
+        self,
+        context: cl.Context,
+        *,
+        parent: tuple[int, ...],
+        precision: Literal["single", "double"] = "single",
+        lanes: Literal[1, 2, 4, 8, 16] | None = None,
+        group: int | None = None,
     ) -> None:
         self.context = context
         self.parent = parent
         self._device = only_device(context)
         self._dtype = real_type(self._device, precision)
         is_cpu = bool(self._device.type & cl.device_type.CPU)
-        self._lanes = (4 if precision == "double" else 8) if is_cpu else 1
-        self._group = 1 if is_cpu else _GROUP
+        self._lanes = lanes or ((4 if precision == "double" else 8) if is_cpu else 1)
+        self._group = group or (1 if is_cpu else _GROUP)
         options = {
             "REAL": "double" if precision == "double" else "float",
             "LANES": self._lanes,
             "S": len(parent),
             "PARENTS": ",".join(str(k) for k in parent),
-            "DAMPING": DAMPING,
-            "KIND": 3 * KINDNESS * _SCALE_M**2,
         }
-        self._program = build(context, ["tree_gauss_newton.cl"], options)
+        self._program = build(context, ["components.cl", "tree_gauss_newton.cl"], options)
         self._queue = cl.CommandQueue(context)
 
     @property
@@ -90,15 +96,7 @@ class TreeGaussNewton:
             return Solved(np.zeros((0, n, 3)), np.zeros((0, n, 4)))
         stride = -(-f // self._lanes) * self._lanes
         origin = stream.position_xyz_m[:, :1].copy()
-        body = np.concatenate(
-            [
-                model.sensor_m,
-                model.offset_m,
-                (_SCALE_M / model.position_sigma_m[:, None]) ** 2,
-                (_SCALE_M / model.rotation_sigma_rad[:, None]) ** 2,
-            ],
-            axis=1,
-        ).astype(self._dtype)
+        body = body_rows(model).astype(self._dtype)
         flags = cl.mem_flags
         given = [
             cl.Buffer(self.context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array)

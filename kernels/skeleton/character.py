@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels import rotation
-from kernels.motion.contacts import find_contacts
 from kernels.skeleton import alignment, kinematics, topology
 from kernels.skeleton.alignment import SIDES, Rig
 from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
+from kernels.skeleton.contacts import find_contacts
 from kernels.skeleton.naming import JointMapping
 from kernels.types import Clip, Float, Skeleton
 

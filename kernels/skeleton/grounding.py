@@ -2,7 +2,7 @@
 
 Conventions
 -----------
-Feet are (F, 2, 3), left first, as in :mod:`kernels.motion.contacts`. The *source* is the motion retargeted from,
+Feet are (F, 2, 3), left first, as in :mod:`kernels.skeleton.contacts`. The *source* is the motion retargeted from,
 already scaled to the canonical legs; the *floor* of the canonical body is y = 0.
 """
 
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from kernels import rotation
-from kernels.motion.contacts import FootContacts, runs
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
+from kernels.skeleton.contacts import FootContacts, runs
 from kernels.types import Float
 
 ANKLES = [JOINTS.index("leftFoot"), JOINTS.index("rightFoot")]

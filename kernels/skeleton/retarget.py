@@ -14,10 +14,10 @@ from itertools import pairwise
 import numpy as np
 
 from kernels import rotation
-from kernels.motion.contacts import FootContacts, find_contacts
 from kernels.skeleton import alignment, grounding, kinematics, topology
 from kernels.skeleton.alignment import SIDES, Rig, X, Y, bone_direction, unit
 from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
+from kernels.skeleton.contacts import FootContacts, find_contacts
 from kernels.skeleton.naming import JointMapping
 from kernels.types import Clip, Float
 

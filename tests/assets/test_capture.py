@@ -7,7 +7,7 @@ import pytest
 from assets.capture import _Reader
 from assets.formats import bvh
 from assets.formats.clips_csv import Facts
-from assets.sources import Clip
+from assets.sources.sources import Clip
 from kernels.synthetic.dancer import take
 from pipelines.resources import NoProgress
 from schemas.settings import Limits, Settings

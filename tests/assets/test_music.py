@@ -8,7 +8,7 @@ import pytest
 from assets.formats import midi
 from assets.formats.errors import FormatError
 from assets.music import listen
-from assets.sources import Song
+from assets.sources.sources import Song
 from kernels.music.notes import sorted_notes
 from schemas.settings import Brief, Limits, Settings
 

@@ -9,7 +9,8 @@ from assets.formats import audio, bvh
 from assets.formats.audio import Audio
 from kernels.synthetic.dancer import take
 from kernels.synthetic.music import drum_machine_song
-from pipelines import commands
+from pipelines.commands.build import build_studio
+from pipelines.commands.dance import dance_songs
 from pipelines.resources import NoProgress
 
 TAKES = {"ayame": ("step", "twist", "wave"), "kaede": ("rock", "kick")}
@@ -44,8 +45,8 @@ def built(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("DAGSTER_HOME", raising=False)
         root = write_studio(tmp_path_factory.mktemp("built") / "studio")
-        assert commands.build(root, dances=False, progress=NoProgress).status == 0
-        outcome = commands.dance(root, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
+        assert build_studio(root, dances=False, progress=NoProgress).status == 0
+        outcome = dance_songs(root, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
         assert outcome.status == 0, outcome.troubles
         yield root
 
@@ -56,7 +57,7 @@ def matched(built, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("DAGSTER_HOME", raising=False)
         root = Path(shutil.copytree(built, tmp_path_factory.mktemp("matched") / "studio"))
-        outcome = commands.dance(root, ["beat"], method="matching", frame_rate_hz=None, out=None, progress=NoProgress)
+        outcome = dance_songs(root, ["beat"], method="matching", frame_rate_hz=None, out=None, progress=NoProgress)
         assert outcome.status == 0, outcome.troubles
         return root
 
@@ -78,6 +79,6 @@ def build():
     """Run ``odori build`` in this process."""
 
     def run(root, *, dances=False):
-        return commands.build(root, dances=dances, progress=NoProgress)
+        return build_studio(root, dances=dances, progress=NoProgress)
 
     return run

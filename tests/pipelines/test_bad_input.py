@@ -12,9 +12,9 @@ import pytest
 from assets.formats import audio
 from assets.formats.audio import Audio
 from kernels.synthetic.dancer import take
-from pipelines import commands
-from pipelines.files import StudioError
+from pipelines.commands.dance import dance_songs
 from pipelines.resources import NoProgress
+from pipelines.studio.files import StudioError
 
 
 def reasons(outcome):
@@ -142,7 +142,7 @@ def test_odd_names(fresh_studio, build):
     assert outcome.facts["clips"]["read"] == 5 + len(ODD_NAMES)
     assert outcome.facts["songs"]["read"] == 1 + len(ODD_NAMES)
     asked = [f"{ODD_NAMES[1]}.wav", ODD_NAMES[2]]
-    danced = commands.dance(fresh_studio, asked, method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
+    danced = dance_songs(fresh_studio, asked, method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
     assert danced.status == 0, danced.troubles
     keys = {d["song"] for d in danced.facts["dances"]}
     assert {p.name for p in (fresh_studio / "dances").iterdir()} == keys
@@ -173,7 +173,7 @@ def test_bad_songs_are_refused_and_the_good_one_is_danced(fresh_studio, build):
     assert set(found) == {f"songs/{name}" for name in SONGS}
     for name, (_, word) in SONGS.items():
         assert word in found[f"songs/{name}"], (name, found[f"songs/{name}"])
-    danced = commands.dance(fresh_studio, ["all"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
+    danced = dance_songs(fresh_studio, ["all"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
     assert danced.status == 1
     assert [d["song"] for d in danced.facts["dances"]] == ["beat"]
     assert len(danced.troubles) == len(SONGS)

@@ -12,11 +12,13 @@ import dagster as dg
 import pyarrow.parquet as pq
 import pytest
 
+from assets.formats.file_names import WINDOWS
 from kernels.opencl.choice import pick_device
 from pipelines import build as building
 from pipelines.collection import freshness
-from pipelines.files import StudioError
-from pipelines.resources import StudioFolder
+from pipelines.definitions import build_definitions
+from pipelines.studio.files import StudioError
+from pipelines.studio.folder import StudioFolder
 
 
 def ran(outcome):
@@ -227,3 +229,105 @@ def test_freshness_says_why(studio):
     assert "motion_beat" in found["motion_beat", "ayame"].why
     assert found["motion_graph_node", ""].state == "waiting"
     assert found["canonical_pose", "ayame"].state == "fresh"
+
+
+def test_a_build_in_another_process_holds_the_studio_and_lets_go_when_it_is_killed(studio):
+    code = (
+        "import pathlib, sys, time; from pipelines import build; from pipelines.resources import StudioFolder\n"
+        "with build.exclusive(StudioFolder(pathlib.Path(sys.argv[1]))): print('held', flush=True); time.sleep(60)"
+    )
+    holder = subprocess.Popen([sys.executable, "-c", code, str(studio)], stdout=subprocess.PIPE)
+    try:
+        assert holder.stdout.readline().strip() == b"held"
+        refused = pytest.raises(StudioError, match="another odori is building it; wait for it to finish")
+        with refused, building.exclusive(StudioFolder(studio)):
+            pass
+    finally:
+        holder.kill()
+        holder.wait()
+        holder.stdout.close()
+    with building.exclusive(StudioFolder(studio)):
+        pass
+
+
+def test_a_folder_that_cannot_be_written_is_said(tmp_path):
+    (tmp_path / "lake").write_bytes(b"a file where a folder has to be")
+    with pytest.raises(StudioError, match="cannot be written"), building.exclusive(StudioFolder(tmp_path)):
+        pass
+
+
+def test_runs_of_the_dead_are_ended_and_those_of_the_living_are_not(studio):
+    instance = building.open_instance(StudioFolder(studio))
+    job = build_definitions(StudioFolder(studio)).resolve_job_def("rebuild_catalog")
+    pid, _, since = building.own_tags()[building.PID_TAG].partition(" ")
+    assert int(pid) == os.getpid()
+    tags = {
+        "mine": f"{pid} {since}",
+        "of another that had my number": f"{pid} {float(since) - 100:.2f}",
+        "of the version before": f"{pid} 123456789",
+        "nobody's": "4194305 5.00",
+    }
+    runs = {
+        name: instance.create_run_for_job(job, status=dg.DagsterRunStatus.STARTED, tags={building.PID_TAG: tag})
+        for name, tag in tags.items()
+    }
+    by_hand = instance.create_run_for_job(job, status=dg.DagsterRunStatus.STARTED)
+    building.end_dead_runs(instance)
+    ended = {name for name, run in runs.items() if instance.get_run_by_id(run.run_id).is_failure}
+    assert ended == set(tags) - {"mine"}
+    assert not instance.get_run_by_id(by_hand.run_id).is_failure
+    building.end_dead_runs(instance, untagged=True)
+    assert instance.get_run_by_id(by_hand.run_id).is_failure
+    assert not instance.get_run_by_id(runs["mine"].run_id).is_failure
+
+
+def windows_names(root):
+    """Rename a lake's files to what Windows calls them."""
+    for path in [*root.rglob("*|*")]:
+        path.rename(path.with_name(path.name.replace("|", "%7C")))
+
+
+def illegal_names(root):
+    return [p for p in root.rglob("*") if set('<>:"|?*') & set(p.name) or p.name.endswith((".", " "))]
+
+
+def test_a_studio_on_windows_is_fresh_danced_and_has_no_name_windows_refuses(studio):
+    assert illegal_names(studio)
+    windows_names(studio)
+    folder = StudioFolder(studio, windows=True)
+    assert not [f for f in freshness(folder).findings() if f.state != "fresh"]
+    assert set(folder.requests()) == {"beat|graph"}
+    for name in ("choreography", "usd_animation"):
+        folder.lake.remove(name, "beat|graph")
+    report = building.bring_up_to_date(
+        folder,
+        build_definitions(folder).resolve_job_def,
+        building.open_instance(folder),
+        freshness(folder),
+        groups=building.GROUPS,
+    )
+    assert {asset for batch in report.ran for asset in batch.assets} >= {"choreography", "usd_animation"}
+    assert report.failed == []
+    assert illegal_names(studio) == []
+    assert (studio / "lake" / "choreography" / "beat%7Cgraph.parquet").is_file()
+    folder.remember("beat|graph", None)
+    assert folder.requests() == {}
+
+
+@pytest.mark.skipif(WINDOWS, reason="there no name with a bar can be")
+def test_a_studio_that_comes_from_windows_is_fresh_here(studio, build):
+    before = {p.relative_to(studio): p.read_bytes() for p in studio.rglob("*|*")}
+    windows_names(studio)
+    assert build(studio, dances=True).facts["ran"] == []
+    assert {p.relative_to(studio): p.read_bytes() for p in studio.rglob("*|*")} == before
+
+
+def test_a_song_named_like_a_device_has_a_folder_windows_takes(tmp_path):
+    assert StudioFolder(tmp_path, windows=True).dances_of("con") == tmp_path / "dances" / "con_"
+    assert StudioFolder(tmp_path, windows=False).dances_of("con") == tmp_path / "dances" / "con"
+    assert StudioFolder(tmp_path, windows=True).frozen().dances_of("con") == tmp_path / "dances" / "con_"
+
+
+def test_stored_paths_have_slashes(built):
+    rows = pq.read_table(built / "lake" / "usd_animation" / "beat|graph.parquet")
+    assert sorted(rows["stage_path"].to_pylist()) == ["dances/beat/graph.usdc", "dances/beat/graph.usdz"]

@@ -13,12 +13,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from assets.formats import usd_check, usd_package, usd_read
-from assets.tables import to_array
-from pipelines import commands, dancing
+from assets.tables.pack import to_array
 from pipelines.collection import ASSETS
-from pipelines.files import StudioError
+from pipelines.commands import dance_report
+from pipelines.commands.dance import dance_songs
 from pipelines.freshness import ON_DEMAND, nodes
 from pipelines.resources import NoProgress
+from pipelines.studio.files import StudioError
 from schemas.catalog import TABLES
 
 
@@ -33,7 +34,7 @@ def odori(*arguments, **options):
 
 
 def dance(root, *songs, fps=None, out=None):
-    return commands.dance(root, songs or ["beat"], method="graph", frame_rate_hz=fps, out=out, progress=NoProgress)
+    return dance_songs(root, songs or ["beat"], method="graph", frame_rate_hz=fps, out=out, progress=NoProgress)
 
 
 def test_dance_of_the_small_studio(built):
@@ -49,6 +50,19 @@ def test_dance_of_the_small_studio(built):
     assert {c["licence"] for c in report["provenance"]["clips"]} == {"CC0-1.0"}
     digest = hashlib.sha256((built / "songs" / "beat.wav").read_bytes()).hexdigest()
     assert report["provenance"]["song"] == {"path": "songs/beat.wav", "sha256": digest}
+
+
+def test_a_copy_to_where_the_stage_is_already_leaves_it(built, tmp_path):
+    """By another spelling, or another name of the same file: where capitals do not count both are one."""
+    stage = tmp_path / "graph.usdz"
+    stage.write_bytes((built / "dances" / "beat" / "graph.usdz").read_bytes())
+    before = stage.stat().st_ino
+    other = tmp_path / "Other.usdz"
+    other.hardlink_to(stage)
+    dance_report.copy_out({"usdz": str(stage)}, other)
+    assert (stage.stat().st_ino, other.stat().st_ino) == (before, before)
+    dance_report.copy_out({"usdz": str(stage)}, tmp_path / "new.usdz")
+    assert (tmp_path / "new.usdz").read_bytes() == stage.read_bytes()
 
 
 def test_stage_holds_the_dance_of_the_lake(built):
@@ -123,7 +137,7 @@ def test_copies_share_a_folder_and_leave_what_is_the_users(studio, tmp_path):
 @pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning", "error::ResourceWarning")
 def test_a_copy_leaves_no_file_open(studio, tmp_path):
     for name in ("a.usdz", "b.usdc"):
-        dancing.copy_out(
+        dance_report.copy_out(
             {"usdz": studio / "dances/beat/graph.usdz", "stage": studio / "dances/beat/graph.usdc"}, tmp_path / name
         )
     gc.collect()

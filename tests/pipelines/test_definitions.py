@@ -11,7 +11,7 @@ from pipelines.collection import ASSETS, freshness
 from pipelines.definitions import build_definitions
 from pipelines.freshness import nodes
 from pipelines.jobs import JOBS
-from pipelines.resources import StudioFolder
+from pipelines.studio.folder import StudioFolder
 from schemas.catalog import TABLES
 
 SNAPSHOT = Path(__file__).with_name("asset_graph.txt")

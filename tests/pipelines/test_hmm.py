@@ -9,10 +9,11 @@ import pytest
 from assets.formats import bvh, midi
 from kernels.music.notes import sorted_notes
 from kernels.synthetic import performance as made_up
-from pipelines import commands
 from pipelines.collection import freshness
-from pipelines.hmm_report import dance_notes, model_facts
-from pipelines.resources import NoProgress, StudioFolder
+from pipelines.commands.dance import dance_songs
+from pipelines.commands.hmm_report import dance_notes, model_facts
+from pipelines.resources import NoProgress
+from pipelines.studio.folder import StudioFolder
 
 RULES = made_up.hidden_rules(seed=4)
 INTERVAL_S, N_MOTIONS = 0.5, 200
@@ -20,7 +21,7 @@ HIDDEN = made_up.draw_states(RULES, 40, seed=99)
 
 
 def dance(root, song, **more):
-    return commands.dance(
+    return dance_songs(
         root, [song], method="hmm", frame_rate_hz=None, out=None, progress=NoProgress, **{"temperature": None, **more}
     )
 
@@ -249,11 +250,9 @@ def test_what_is_not_as_wanted_has_a_reason():
 
 
 def test_temperature_is_bounded(studio):
-    from pipelines.files import StudioError
+    from pipelines.studio.files import StudioError
 
     with pytest.raises(StudioError, match="--temperature: want 0 to 10"):
         dance(studio, "new", temperature=-1.0)
     with pytest.raises(StudioError, match="want the method hmm"):
-        commands.dance(
-            studio, ["new"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress, temperature=1.0
-        )
+        dance_songs(studio, ["new"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress, temperature=1.0)

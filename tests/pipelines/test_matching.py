@@ -7,23 +7,25 @@ import numpy as np
 import pyarrow.compute as pc
 import pytest
 
-from assets import matching_tables, tables
 from assets.formats import audio, bvh
 from assets.formats.audio import Audio
 from assets.formats.errors import FormatError
+from assets.tables import matching as matching_tables
+from assets.tables import pack as tables
 from kernels.matching.pieces import motion_under
 from kernels.matching.score import reference_matches, similarity
 from kernels.synthetic.dancer import take
 from kernels.types import Clip
-from pipelines import commands
 from pipelines.collection import freshness
-from pipelines.resources import NoProgress, StudioFolder
+from pipelines.commands.dance import dance_songs
+from pipelines.resources import NoProgress
+from pipelines.studio.folder import StudioFolder
 
 pytestmark = pytest.mark.opencl
 
 
 def dance(root, song="beat", method="matching"):
-    return commands.dance(root, [song], method=method, frame_rate_hz=None, out=None, progress=NoProgress)
+    return dance_songs(root, [song], method=method, frame_rate_hz=None, out=None, progress=NoProgress)
 
 
 def lake(root):
@@ -178,7 +180,7 @@ def test_unchanged_clips_are_carried_over(studio, build):
 
 def test_the_brief_names_the_method(studio):
     (studio / "songs" / "beat.brief.toml").write_text('method = "matching"\n')
-    outcome = commands.dance(studio, ["beat"], frame_rate_hz=None, out=None, progress=NoProgress)
+    outcome = dance_songs(studio, ["beat"], frame_rate_hz=None, out=None, progress=NoProgress)
     assert outcome.facts["method"] == "matching"
     outcome = dance(studio, method="graph")
     assert outcome.facts["method"] == "graph"
@@ -186,7 +188,7 @@ def test_the_brief_names_the_method(studio):
 
 def test_a_method_nobody_knows_refuses_the_song(fresh_studio):
     (fresh_studio / "songs" / "beat.brief.toml").write_text('method = "hmm2"\n')
-    outcome = commands.dance(fresh_studio, ["beat"], frame_rate_hz=None, out=None, progress=NoProgress)
+    outcome = dance_songs(fresh_studio, ["beat"], frame_rate_hz=None, out=None, progress=NoProgress)
     assert outcome.status == 2
     assert "method: want one of graph, matching" in outcome.facts["error"]
 
@@ -273,7 +275,7 @@ def test_an_interrupted_match_leaves_what_was_there(studio, monkeypatch):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("kernels.matching.search.Matcher.matches", stop)
+    monkeypatch.setattr("kernels.opencl.match.Matcher.matches", stop)
     assert dance(studio).status == 2
     assert lake(studio).path("match", "beat").read_bytes() == before
     assert not list((studio / "lake").rglob(".tmp-*"))

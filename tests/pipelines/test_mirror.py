@@ -4,9 +4,11 @@ import numpy as np
 import polars as pl
 import pyarrow.parquet as pq
 
-from assets import tables
+from assets.tables import pack as tables
 from kernels.skeleton.canonical import mirror
-from pipelines import commands
+from pipelines.commands.dance import dance_songs
+from pipelines.commands.propose import propose_pins
+from pipelines.commands.why import explain_dance
 from pipelines.resources import NoProgress
 
 
@@ -18,7 +20,7 @@ def test_a_mirrored_catalogue_is_twice_as_large_and_its_dance_says_what_is_mirro
     plain = rows(studio, "motion_graph_node").num_rows
     (studio / "odori.toml").write_text("[motion_graph]\nmirror = true\n")
     asked = {"method": "graph", "frame_rate_hz": None, "out": None, "progress": NoProgress}
-    outcome = commands.dance(studio, ["beat"], pins=["3-5=step"], **asked)
+    outcome = dance_songs(studio, ["beat"], pins=["3-5=step"], **asked)
     assert outcome.status == 0, outcome.troubles
     node = rows(studio, "motion_graph_node")
     assert node.num_rows == 2 * plain
@@ -29,7 +31,7 @@ def test_a_mirrored_catalogue_is_twice_as_large_and_its_dance_says_what_is_mirro
     assert lineage["is_mirrored"].any()
     alone = lineage.filter(pl.col("is_mirrored") & pl.col("blend_clip_id").is_null())
     frame = int(alone["frame_index"][len(alone) // 2])
-    told = commands.why(studio, "beat", at_s=frame / 30.0)
+    told = explain_dance(studio, "beat", at_s=frame / 30.0)
     assert told.facts["is_mirrored"]
     here = alone.filter(pl.col("frame_index") == frame).row(0, named=True)
     session = here["clip_id"].partition("-")[0]
@@ -48,7 +50,7 @@ def test_a_mirrored_clip_keeps_pins_by_what_it_shows(studio):
     (studio / "odori.toml").write_text("[motion_graph]\nmirror = true\n")
     named = studio / "clips" / "ayame" / "clips.csv"
     named.write_text(named.read_text().replace("step.bvh,step,", "step.bvh,step-left,"))
-    outcome = commands.dance(
+    outcome = dance_songs(
         studio,
         ["beat"],
         pins=["2=step-right", "8=step-left"],
@@ -65,7 +67,7 @@ def test_a_mirrored_clip_keeps_pins_by_what_it_shows(studio):
     lineage = pl.DataFrame(rows(studio, "frame_lineage", "beat|graph"))
     shown = {at: lineage.filter(pl.col("time_s") >= at)["is_mirrored"][0] for at in (2.0, 8.0)}
     assert shown == {2.0: True, 8.0: False}
-    proposed = commands.propose(studio, "beat", "4", pins=["4=step-right"], progress=NoProgress)
+    proposed = propose_pins(studio, "beat", "4", pins=["4=step-right"], progress=NoProgress)
     row = proposed.facts["clips"][0]
     assert (row["label"], row["is_mirrored"]) == ("step-right", True)
     assert "pose_pin" not in row

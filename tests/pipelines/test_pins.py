@@ -7,10 +7,10 @@ import polars as pl
 import pytest
 
 from assets.formats import usd_read
-from pipelines import commands
-from pipelines.files import StudioError
+from pipelines.commands.dance import dance_songs
+from pipelines.commands.status import status
 from pipelines.resources import NoProgress
-from pipelines.status import status
+from pipelines.studio.files import StudioError
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def dance(studio):
     """Dance the song of the small studio as it is asked for."""
 
     def run(**asked):
-        return commands.dance(studio, ["beat"], frame_rate_hz=None, out=None, progress=NoProgress, **asked)
+        return dance_songs(studio, ["beat"], frame_rate_hz=None, out=None, progress=NoProgress, **asked)
 
     return run
 

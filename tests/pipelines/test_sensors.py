@@ -10,9 +10,9 @@ import pytest
 from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.resources import StudioFolder
 from pipelines.schedules import nightly
 from pipelines.sensors import source_sensor
+from pipelines.studio.folder import StudioFolder
 
 
 @pytest.fixture
@@ -126,7 +126,10 @@ def test_what_comes_back_is_asked_for_again(studio, look):
         keys.append(requests(results)[0].run_key)
         instance = building.open_instance(StudioFolder(studio))
         building.bring_up_to_date(
-            StudioFolder(studio), build_definitions(StudioFolder(studio)), instance, freshness(StudioFolder(studio))
+            StudioFolder(studio),
+            build_definitions(StudioFolder(studio)).resolve_job_def,
+            instance,
+            freshness(StudioFolder(studio)),
         )
     assert len(set(keys)) == 3
 

@@ -7,17 +7,18 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from assets import tables
 from assets.formats import bvh, suit
+from assets.tables import pack as tables
 from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.synthetic.dancer import take
 from kernels.synthetic.medley import medley, wear
 from kernels.synthetic.suit import Disturbance, made_up, make_body, record
-from pipelines import commands
 from pipelines.collection import freshness
-from pipelines.resources import NoProgress, StudioFolder
-from pipelines.status import status
+from pipelines.commands.build import build_studio
+from pipelines.commands.status import status
+from pipelines.resources import NoProgress
+from pipelines.studio.folder import StudioFolder
 
 NOISE = Disturbance(0.001, 0.01, 0.002, 0.003, 0.003)
 
@@ -41,7 +42,7 @@ def built_suit(tmp_path_factory, danced):
         (clips / "torn.csv").write_bytes(b"frame,time_s,sensor,qw\n0,0,head,1\n")
         (clips / "walk.bvh").write_bytes(bvh.format(take("rock", n_beats=8).clip))
         (clips / "clips.csv").write_text("file,label,licence\nmedley.parquet,medley,CC0-1.0\n")
-        yield root, commands.build(root, dances=False, progress=NoProgress)
+        yield root, build_studio(root, dances=False, progress=NoProgress)
 
 
 @pytest.fixture
@@ -114,7 +115,7 @@ def test_a_changed_setting_calibrates_again_and_leaves_bvh_alone(studio):
     before = stored(studio, "calibration")
     (studio / "odori.toml").write_text("[calibration]\nlow_pass_hz = 6\n")
     assert any("settings [joints]" in f.why for f in freshness(StudioFolder(studio)).findings() if f.state == "stale")
-    commands.build(studio, dances=False, progress=NoProgress)
+    build_studio(studio, dances=False, progress=NoProgress)
     after = stored(studio, "calibration")
     assert not after["in_child_sensor_xyz_m"].equals(before["in_child_sensor_xyz_m"])
     counts = _materialised(studio, "pose")
@@ -124,7 +125,7 @@ def test_a_changed_setting_calibrates_again_and_leaves_bvh_alone(studio):
 def test_unchanged_recordings_are_carried_over_with_the_same_bytes(studio):
     before = stored(studio, "calibration")
     (studio / "clips" / "suit" / "more.bvh").write_bytes(bvh.format(take("kick", n_beats=8).clip))
-    commands.build(studio, dances=False, progress=NoProgress)
+    build_studio(studio, dances=False, progress=NoProgress)
     assert stored(studio, "calibration").equals(before)
     counts = _materialised(studio, "pose")
     assert (counts["computed_clips"].value, counts["carried_clips"].value) == (1, 4)
@@ -137,16 +138,16 @@ def test_a_sensor_table_in_the_settings_reaches_the_reader(studio):
     place = studio / "clips" / "suit" / "torn.csv"
     text = suit.format_csv(made_up(5, n_frames=1000, disturbance=NOISE).recording).decode()
     place.write_text(text.replace(",head,", ",hat,"))
-    commands.build(studio, dances=False, progress=NoProgress)
+    build_studio(studio, dances=False, progress=NoProgress)
     assert "sensor 'hat'" in rows(studio)["torn.csv"]["reason"]
     (studio / "odori.toml").write_text('[sensors]\nhat = "head"\n')
-    commands.build(studio, dances=False, progress=NoProgress)
+    build_studio(studio, dances=False, progress=NoProgress)
     assert rows(studio)["torn.csv"]["state"] == "read", rows(studio)["torn.csv"]["reason"]
 
 
 def test_a_recording_taken_away_takes_its_rows_with_it(studio):
     (studio / "clips" / "suit" / "medley.parquet").unlink()
-    commands.build(studio, dances=False, progress=NoProgress)
+    build_studio(studio, dances=False, progress=NoProgress)
     assert stored(studio, "calibration").num_rows == 0
 
 

@@ -10,12 +10,13 @@ import pytest
 from assets.formats import bvh
 from kernels.synthetic.dancer import take
 from pipelines import build as building
-from pipelines import commands
 from pipelines.collection import freshness
+from pipelines.commands.dance import dance_songs
+from pipelines.commands.status import status
 from pipelines.definitions import build_definitions
-from pipelines.files import LakeError, StudioError
-from pipelines.resources import NoProgress, StudioFolder
-from pipelines.status import status
+from pipelines.resources import NoProgress
+from pipelines.studio.files import LakeError, StudioError
+from pipelines.studio.folder import StudioFolder
 
 
 def states(root):
@@ -65,7 +66,7 @@ def test_one_failing_session_stops_no_other(fresh_studio, build, failing_session
     failed = [a for a in status(fresh_studio).facts["assets"] if a["state"] == "failed"]
     assert ("motion_beat", "kaede") in {(a["asset"], a["partition"]) for a in failed}
     assert any("the plotter broke" in a["why"] for a in failed)
-    danced = commands.dance(fresh_studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
+    danced = dance_songs(fresh_studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
     assert danced.facts["usdz"]
 
 
@@ -93,7 +94,7 @@ def test_settings_edited_during_a_run_count_next_time(studio, monkeypatch):
     folder = StudioFolder(studio)
     monkeypatch.setattr(motion, "motion_beats", edit)
     batch = building.Batch("rebuild_motion", ("motion_beat",), ("ayame", "kaede"))
-    assert building.execute(batch, build_definitions(folder), building.open_instance(folder)) == []
+    assert building.execute(batch, build_definitions(folder).resolve_job_def, building.open_instance(folder)) == []
     assert freshness(folder).state("motion_beat", "ayame").state == "stale"
     settings.write_text("[motion_beat]\ncomponent = 2\n")
     assert freshness(folder).state("motion_beat", "ayame").state == "fresh"
@@ -105,7 +106,7 @@ def test_lost_stages_are_made_again(studio):
     stage.unlink()
     finding = freshness(StudioFolder(studio)).state("usd_animation", "beat|graph")
     assert (finding.state, finding.why) == ("stale", "graph.usdz is not there any more")
-    outcome = commands.dance(studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
+    outcome = dance_songs(studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
     assert outcome.status == 0
     assert stage.read_bytes() == before
 

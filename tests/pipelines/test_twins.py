@@ -4,8 +4,10 @@ import pyopencl as cl
 import pytest
 
 from kernels.opencl.device import list_devices
-from pipelines import commands
-from pipelines.resources import NoProgress, StudioFolder
+from pipelines.commands.build import build_studio
+from pipelines.commands.dance import dance_songs
+from pipelines.resources import NoProgress
+from pipelines.studio.folder import StudioFolder
 
 pytestmark = [pytest.mark.opencl, pytest.mark.skipif(not list_devices(), reason="no OpenCL device here")]
 
@@ -15,7 +17,7 @@ def table(root, name, key=""):
 
 
 def build(root):
-    return commands.build(root, dances=False, progress=NoProgress)
+    return build_studio(root, dances=False, progress=NoProgress)
 
 
 def forget_graph(root):
@@ -59,7 +61,7 @@ def test_matches_on_the_reference_are_the_same(matched, tmp_path, monkeypatch, h
         (root / "odori.toml").write_text('[opencl]\ndevice = "reference"\n')
     else:
         monkeypatch.setattr("kernels.opencl.match.Matcher.matches", refuse)
-    outcome = commands.dance(root, ["beat"], method="matching", frame_rate_hz=None, out=None, progress=NoProgress)
+    outcome = dance_songs(root, ["beat"], method="matching", frame_rate_hz=None, out=None, progress=NoProgress)
     assert outcome.status == 0, outcome.troubles
     assert table(root, "match", "beat").equals(table(matched, "match", "beat"))
 
@@ -67,7 +69,7 @@ def test_matches_on_the_reference_are_the_same(matched, tmp_path, monkeypatch, h
 def test_without_opencl_a_studio_is_built_and_danced(fresh_studio, monkeypatch, capsys, built):
     monkeypatch.setattr("pipelines.devices.found_devices", tuple)
     assert build(fresh_studio).status == 0
-    outcome = commands.dance(fresh_studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
+    outcome = dance_songs(fresh_studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
     assert outcome.status == 0, outcome.troubles
     assert "no OpenCL device is there" in capsys.readouterr().err
     steps = table(fresh_studio, "choreography", "beat|graph")

@@ -1,5 +1,8 @@
 """Keys: legal for every name there is, stable, and telling names apart."""
 
+import hashlib
+import unicodedata
+
 import numpy as np
 import pytest
 
@@ -110,3 +113,18 @@ def test_an_image_has_a_name_of_its_own_that_is_no_key_and_tells_its_clip():
 def test_a_mirrored_clip_shows_the_other_side(label, seen):
     assert seen_label(label, mirrored("a-b")) == seen
     assert seen_label(label, "a-b") == label
+
+
+@pytest.mark.parametrize("name", ["ガ", "Été ガ", "a" * 200 + "é"])
+def test_a_name_has_one_key_however_its_accents_are_put_together(name):
+    apart, together = (unicodedata.normalize(form, name) for form in ("NFD", "NFC"))
+    assert apart != together
+    assert song_key(apart) == song_key(together)
+    assert clip_key([apart], apart) == clip_key([together], together)
+    assert session_key([apart, apart, "long" * 8]) == session_key([together, together, "long" * 8])
+    assert part_of(apart, 64) == part_of(together, 64)
+
+
+def test_keys_of_names_put_together_are_those_they_always_were():
+    assert song_key("踊り") == "x" + hashlib.sha256("踊り".encode()).hexdigest()[:8]
+    assert song_key("ガ") == "x" + hashlib.sha256("ガ".encode()).hexdigest()[:8]

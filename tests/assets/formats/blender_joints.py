@@ -50,5 +50,6 @@ Path(out).write_text(
             "joints": joints,
             "vertices": vertices,
         }
-    )
+    ),
+    encoding="utf-8",
 )

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from upath import UPath
 
-from assets.formats import audio, usd
+from assets.formats import audio, beside, usd
 from assets.formats.audio import Audio
 from assets.formats.beside import MARK, sweep, written_beside
 from assets.formats.tree import File, HashCache
-from pipelines.files import write_beside
+from pipelines.studio.files import LakeError, write_beside
 
 
 def test_the_file_is_whole_and_alone(tmp_path):
@@ -79,3 +79,59 @@ def test_sweep_takes_leftovers_of_two_levels_and_nothing_else(tmp_path):
         (tmp_path / name).write_bytes(b"x")
     assert sweep(tmp_path) == 2
     assert sorted(p.name for p in tmp_path.rglob("*") if p.is_file()) == [".hidden", "b.parquet", "c.json"]
+
+
+def held(errno_, winerror):
+    """An error as Windows raises it."""
+    error = PermissionError(errno_, "Access is denied")
+    error.winerror = winerror
+    return error
+
+
+@pytest.mark.parametrize("winerror", [5, 32, 1224])
+def test_a_file_that_a_reader_holds_open_for_a_moment_is_waited_for(tmp_path, monkeypatch, winerror):
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"old")
+    replace, refused = Path.replace, iter([held(errno.EACCES, winerror)] * 3)
+
+    def replace_later(self, target):
+        if error := next(refused, None):
+            raise error
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace_later)
+    with written_beside(path) as partial:
+        partial.write_bytes(b"new")
+    assert path.read_bytes() == b"new"
+    assert next(refused, None) is None
+
+
+def test_what_is_held_for_good_is_an_error_and_the_old_file_stays(tmp_path, monkeypatch):
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"old")
+    tries = []
+
+    def refuse(self, target):
+        tries.append(target)
+        raise held(errno.EACCES, 32)
+
+    monkeypatch.setattr(Path, "replace", refuse)
+    monkeypatch.setattr(beside, "_PATIENCE_S", 0.12)
+    with pytest.raises(LakeError, match="another program has it open"):
+        write_beside(path, lambda file: file.write(b"new"))
+    assert len(tries) > 1
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_no_waiting_mends_is_not_waited_for(tmp_path, monkeypatch):
+    tries = []
+
+    def refuse(self, target):
+        tries.append(target)
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(Path, "replace", refuse)
+    with pytest.raises(LakeError, match="mend the folder's permissions"):
+        write_beside(tmp_path / "a.bin", lambda file: file.write(b"new"))
+    assert len(tries) == 1

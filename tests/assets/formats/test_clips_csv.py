@@ -1,5 +1,7 @@
 """What a studio says of its clips, in our columns and in those of data sets."""
 
+import unicodedata
+
 import pytest
 
 from assets.formats.clips_csv import Facts, is_clips_csv, misspelt_columns, parse, row_of
@@ -72,3 +74,11 @@ def test_which_files_are_read():
         "Labels.CSV",
         "labels_extra.csv",
     ]
+
+
+@pytest.mark.parametrize("forms", [("NFC", "NFD"), ("NFD", "NFC"), ("NFD", "NFD")])
+def test_accents_may_be_put_together_or_apart(forms):
+    said, stored = (unicodedata.normalize(form, "ガ/Été.bvh") for form in forms)
+    facts = parse(f"file,label\n{said},spin\n".encode())
+    for folders, name in ((stored.split("/")[:1], stored.split("/")[1]), ([], stored.split("/")[1])):
+        assert facts[row_of(facts, folders, name)].label == "spin"

@@ -1,5 +1,7 @@
 """The search index on disk."""
 
+from pathlib import Path
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -95,3 +97,23 @@ def test_a_graph_is_renewed_by_what_changed(tmp_path, vector):
     assert 7 not in found.candidates(vector[7:8], 5)
     assert 7 in found.candidates(changed[7:8], 5)
     assert len([p for p in tmp_path.iterdir() if p.suffix == ".usearch"]) == 1
+
+
+def test_a_file_that_another_search_has_mapped_is_left_to_the_next_time(tmp_path, vector, monkeypatch):
+    store(tmp_path, table(vector), vector)
+    old = {path.name for path in tmp_path.glob("vectors-*")}
+    unlink = Path.unlink
+
+    def refuse(self, missing_ok=False):
+        if self.name in old:
+            error = PermissionError(13, "The process cannot access the file")
+            error.winerror = 1224
+            raise error
+        unlink(self, missing_ok=missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", refuse)
+        store(tmp_path, table(vector), -vector)
+    assert old < {path.name for path in tmp_path.glob("vectors-*")}
+    motion_index.remove_others(tmp_path, store(tmp_path, table(vector), -vector))
+    assert not old & {path.name for path in tmp_path.glob("vectors-*")}

@@ -93,3 +93,10 @@ def test_broken_or_missing_memory_is_started_anew(tmp_path):
     (tmp_path / "hashes.json").write_text("[broken")
     digest = HashCache(tmp_path / "hashes.json").sha256(place.parent, walk(place.parent)[0], time.time_ns())
     assert digest == hashlib.sha256(b"one").hexdigest()
+
+
+def test_what_windows_and_macos_leave_in_folders_is_left_out(tmp_path):
+    for name in ("Thumbs.db", "a/desktop.ini", "a/Desktop.ini", ".DS_Store", "a/._one.bvh", "a/one.bvh"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"x")
+    assert [f.path for f in walk(tmp_path)] == ["a/one.bvh"]

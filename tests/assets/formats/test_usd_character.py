@@ -176,3 +176,16 @@ def test_names():
 def test_a_giant_is_in_another_unit_than_its_file_says(write_hero, tmp_path):
     with pytest.raises(FormatError, match=r"0\.2 to 10 m, got 1\d\d m; say in the file what its unit is"):
         usd_character.read_rig(write_hero(tmp_path / "giant.usda", size=100.0))
+
+
+def test_files_of_windows_are_named_and_their_textures_too():
+    assert usd_character.is_file(r"C:\heroes\hero.usdz")
+    assert usd_character.split(r"C:\heroes\hero.usd:/Hero/Skel") == (r"C:\heroes\hero.usd", "/Hero/Skel")
+    assert usd_character.split("C:/heroes/hero.usdc") == ("C:/heroes/hero.usdc", "")
+
+
+@pytest.mark.parametrize("written", [r"..\looks\skin?.png", "../looks/skin?.png", "C:/looks/skin?.png"])
+def test_a_texture_is_named_by_its_file_whatever_system_wrote_the_path(write_hero, tmp_path, written):
+    copy = usd_character.flat_copy(write_hero(tmp_path / "hero.usda", texture=written))
+    attribute = copy.layer.GetAttributeAtPath("/Hero/Looks/Skin.inputs:file")
+    assert attribute.default.path == "./skin_.png"

@@ -9,9 +9,9 @@ from kernels.assembly.feet import SAY, lock_feet, planted_feet
 from kernels.assembly.foot_quality import foot_measures
 from kernels.assembly.seam_quality import seam_measures
 from kernels.assembly.stance import clip_contacts
-from kernels.motion.contacts import FootContacts
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.canonical import CANONICAL
+from kernels.skeleton.contacts import FootContacts
 
 
 @pytest.fixture

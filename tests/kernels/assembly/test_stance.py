@@ -5,9 +5,9 @@ import pytest
 
 from kernels import rotation
 from kernels.assembly.stance import clip_contacts, meet, planted_share
-from kernels.motion.contacts import FootContacts
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.canonical import CANONICAL
+from kernels.skeleton.contacts import FootContacts
 
 FEET = grounding.ANKLES + grounding.TOES
 

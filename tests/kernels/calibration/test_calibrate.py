@@ -47,6 +47,12 @@ def test_the_same_bits_twice(cleaned, calibration):
     assert again.findings == calibration.findings
 
 
+def test_joints_are_given_to_ten_nanometres(calibration):
+    for joint in calibration.joints:
+        for place in (joint.in_parent_sensor_m, joint.in_child_sensor_m):
+            np.testing.assert_array_equal(place, np.round(place, 8))  # so that no last bits of a processor's are left
+
+
 def test_what_is_rated_high_is_near():
     made = suit.made_up(41, n_frames=4000, disturbance=suit.Disturbance(wobble_m=0.01))
     found = calibrate(clean(made.recording))

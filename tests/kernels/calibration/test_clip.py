@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from kernels import rotation
+from kernels.calibration import clip as clip_module
 from kernels.calibration.clip import find_gauge, to_clip
 from kernels.calibration.records import SENSORS, Poses
 from kernels.skeleton import kinematics
@@ -44,6 +45,29 @@ def test_any_world_is_stood_up(poses, turn):
     )
     place, _ = kinematics.place(to_clip(turned, 120.0))
     assert (place[:, 2, 1] > place[:, SENSORS.index("l_foot"), 1]).all()
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, 0.5, np.pi / 2, 3.0, np.pi, -1e-9 - np.pi / 2, -3.0, 1e-6 - np.pi])
+def test_a_body_that_faces_any_way_is_turned_to_z(poses, heading_rad):
+    gauge = find_gauge(poses, 120.0)
+    turn = rotation.mul(rotation.from_heading(heading_rad), gauge.up_wxyz)
+    turned = replace(
+        poses,
+        position_xyz_m=rotation.apply(turn, poses.position_xyz_m),
+        rotation_wxyz=rotation.mul(turn, poses.rotation_wxyz),
+    )
+    apart = rotation.angle_between(find_gauge(turned, 120.0).rest_wxyz, gauge.rest_wxyz)
+    assert apart.max() < 1e-7
+
+
+@pytest.mark.parametrize("angle_rad", [0.0, 1.0, 2.0, np.pi, -1.0, -2.0, 1e-9 - np.pi])
+def test_the_turn_ahead_is_that_of_the_hip_lines_angle(angle_rad):
+    found = clip_module._ahead(0.3 * np.cos(angle_rad), 0.3 * np.sin(angle_rad))
+    np.testing.assert_allclose(found, rotation.from_heading(angle_rad), atol=4 * 2.0**-52)
+
+
+def test_a_hip_line_that_stands_upright_turns_nothing():
+    np.testing.assert_array_equal(clip_module._ahead(0.0, 0.0), rotation.IDENTITY)
 
 
 def test_names_are_known_and_retargeting_goes_through(poses):

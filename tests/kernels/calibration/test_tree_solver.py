@@ -1,15 +1,28 @@
+import hashlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from kernels import rotation
+from kernels.calibration import tree_solver
 from kernels.calibration.poses import body_model, gaps, to_stream
-from kernels.calibration.tree_solver import Stream, make_model, solve_tree
+from kernels.calibration.tree_solver import DAMPING, KINDNESS, Stream, body_rows, make_model, solve_tree
 
 
 def true_model(made):
     return make_model(made.body.in_parent_sensor_m, made.body.in_child_sensor_m)
+
+
+def arithmetic_problem():
+    """Some body and sensors made by arithmetic alone, so that they are the same on every processor."""
+    rng = np.random.default_rng(0)
+    model = make_model(rng.random((16, 3)) / 2 - 0.25, rng.random((16, 3)) / 2 - 0.25)
+    q = rng.random((401, 17, 4)) - 0.5
+    q[..., 0] += 2
+    w, x, y, z = (q[..., k : k + 1] for k in range(4))
+    q /= np.sqrt(w * w + x * x + y * y + z * z)
+    return model, Stream(rng.random((401, 17, 3)) * 2, q, rng.random((401, 17)) + 0.04)
 
 
 def test_perfect_sensors_give_the_true_body(perfect):
@@ -72,6 +85,40 @@ def test_moving_the_world_moves_the_answer(cleaned, calibration):
     )
     one, other = solve_tree(model, some), solve_tree(model, moved)
     np.testing.assert_allclose(other.position_xyz_m, rotation.apply(turn, one.position_xyz_m) + shift, atol=1e-9)
+
+
+def test_a_frame_has_the_same_bits_in_any_portion(cleaned, calibration, monkeypatch):
+    model, stream = body_model(calibration), to_stream(cleaned)
+    some = Stream(stream.position_xyz_m[13:60], stream.rotation_wxyz[13:60], stream.weight[13:60])
+    whole = solve_tree(model, stream)
+    monkeypatch.setattr(tree_solver, "_PORTION", 5)
+    part = solve_tree(model, some)
+    np.testing.assert_array_equal(part.position_xyz_m, whole.position_xyz_m[13:60])
+    np.testing.assert_array_equal(part.rotation_wxyz, whole.rotation_wxyz[13:60])
+
+
+def test_the_bits_are_known():
+    # they are the same on every processor: where this fails, the arithmetic changed, and stored poses with it
+    solved = solve_tree(*arithmetic_problem())
+    bits = (solved.position_xyz_m + 0.0).tobytes() + (solved.rotation_wxyz + 0.0).tobytes()
+    assert hashlib.sha256(bits).hexdigest()[:16] == "57cce236d4ac18c3"
+
+
+def test_an_origin_far_off_costs_nothing(cleaned, calibration):
+    model, stream = body_model(calibration), to_stream(cleaned)
+    far = 1e6  # metres, of which float64 still tells 1e-10
+    one = solve_tree(model, stream)
+    other = solve_tree(model, replace(stream, position_xyz_m=stream.position_xyz_m + far))
+    np.testing.assert_allclose(other.position_xyz_m - far, one.position_xyz_m, rtol=0, atol=4 * far * 2.0**-52)
+    np.testing.assert_allclose(other.rotation_wxyz, one.rotation_wxyz, rtol=0, atol=100 * far * 2.0**-52)
+
+
+def test_a_body_is_written_in_rows():
+    model = make_model(np.full((16, 3), 0.2), np.full((16, 3), -0.1), position_sigma_m=0.01, rotation_sigma_rad=0.02)
+    row = body_rows(model)[1]
+    np.testing.assert_allclose(row[:6], [0.1, 0.1, 0.1, 0.2, 0.2, 0.2])
+    np.testing.assert_allclose(row[6:9], [0.25, 0.0625, DAMPING * 0.0625])
+    np.testing.assert_allclose(row[9:], [1 / (3 * KINDNESS * 0.01**2), 1 / (3 * KINDNESS * 0.02**2)])
 
 
 def test_no_frames(calibration):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.motion.contacts import find_contacts, foot_slide
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.character import measure
+from kernels.skeleton.contacts import find_contacts, foot_slide
 from kernels.skeleton.fit import fit, put_on
 from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget

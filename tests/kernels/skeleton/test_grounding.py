@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.motion.contacts import FootContacts, find_contacts, foot_slide
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
+from kernels.skeleton.contacts import FootContacts, find_contacts, foot_slide
 from kernels.skeleton.grounding import ANKLES, TOES
 from kernels.synthetic import dancer
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.motion.contacts import find_contacts, foot_slide
 from kernels.skeleton import canonical, kinematics, naming
 from kernels.skeleton.canonical import CANONICAL, JOINTS
+from kernels.skeleton.contacts import find_contacts, foot_slide
 from kernels.skeleton.grounding import ANKLES, TOES
 from kernels.skeleton.retarget import retarget
 from kernels.synthetic import dancer, rigs

@@ -5,9 +5,9 @@ import pytest
 
 from assets.formats import bvh
 from kernels import rotation
-from kernels.motion.contacts import find_contacts, foot_slide
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
+from kernels.skeleton.contacts import find_contacts, foot_slide
 from kernels.skeleton.grounding import ANKLES, TOES
 from kernels.skeleton.retarget import retarget
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kernels.motion.contacts import find_contacts, foot_slide
 from kernels.skeleton.canonical import JOINTS, LEG_LENGTH_M
+from kernels.skeleton.contacts import find_contacts, foot_slide
 from kernels.synthetic.dancer import MOVES, place, plan_foot, take
 
 ANKLE = [JOINTS.index("leftFoot"), JOINTS.index("rightFoot")]

@@ -1,0 +1,1 @@
+"""How a song is danced and directed: methods, wishes, refusals, licences, characters. Knows no Dagster."""

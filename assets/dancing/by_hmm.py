@@ -1,0 +1,375 @@
+"""From the model of the dancer and a song to steps: which basic motion when, and which recording of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from assets.dancing import hmm_wishes, licences
+from assets.dancing.asked import Direction
+from assets.dancing.danced import Danced, Markdown
+from assets.dancing.method import DanceOrder, Method
+from assets.dancing.recordings import choose_recordings, ends_of
+from assets.dancing.refusal import RefusalError
+from assets.dancing.wishes import Nodes
+from assets.plots import draw as plots
+from assets.plots import hmm as hmm_plots
+from assets.reading.clips import read_clips
+from assets.reading.hearing import hear
+from assets.reading.songs import PlayedSong, heard_song
+from assets.stamps import Stored, repeatable
+from assets.tables import hmm as hmm_tables
+from assets.tables.hmm import ClipMotions
+from kernels.assembly.timing import blend_widths, trim
+from kernels.hmm import durations
+from kernels.hmm.decode import Chain, decode_varied
+from kernels.hmm.evidence import Evidence
+from kernels.hmm.instances import Motions
+from kernels.hmm.links import link
+from kernels.hmm.model import Model
+from kernels.hmm.pins import SpanReach
+from kernels.hmm.places import Places, Wish, crowded_cost, keep_wishes, place
+from kernels.hmm.seams import Ends
+from kernels.hmm.viterbi import Spans, best_spans, sample_spans
+from kernels.matching.path import to_choreography
+from kernels.types import Float
+from schemas.settings import Settings
+
+LARGEST_POOL = 8_000
+"""Motions a dance is chosen from: pinned clips first, then performances, then clips in order of their names."""
+
+LONGEST_SPAN = 8
+LEAST_LOG = -12.0
+"""Log probability of a length in which a recording can be danced, however seldom motions of its kind are so long."""
+
+UNSURE = 0.5
+"""Where nobody danced to a song, motions cost so much more or less at random, drawn by the seed: else the one cheapest
+loop would be danced to every song."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dancer:
+    """What is known of the dancer.
+
+    Parameters
+    ----------
+    model : Model
+    evidence : whether the music tells anything
+    clip_ids : names of the clips that may be danced
+    motions : Motions of those clips, all of a known kind
+    nodes : clip, label and style of each motion, as pins name them
+    """
+
+    model: Model
+    evidence: Evidence
+    clip_ids: tuple[str, ...]
+    motions: Motions
+    nodes: Nodes
+
+
+def load_dancer(
+    choreography_model: pa.Table,
+    music_evidence: pa.Table,
+    key_pose: Stored,
+    performed: set[str],
+    clips: pl.DataFrame,
+    *,
+    asked: Direction,
+    settings: Settings,
+) -> Dancer:
+    """Read the model, and the motions of all clips that may be danced.
+
+    Raises
+    ------
+    RefusalError
+        If there is no motion to dance.
+    """
+    if not choreography_model.num_rows:
+        raise RefusalError("no clip can be danced: none has a motion from braking to braking; add clips that move")
+    every = hmm_tables.all_motions(key_pose.read(key) for key in key_pose.keys)
+    subject = settings.choreography_model.subject
+    own = clips.filter(pl.col("subject") == subject) if subject else clips
+    free = licences.free_to_join(dict(own.select("clip_id", "licence").iter_rows()), asked.allow)
+    usable = {clip: motions.known() for clip, motions in every.items() if clip in free}
+    usable = {clip: motions for clip, motions in usable.items() if len(motions.state)}
+    if not usable:
+        why = (
+            f"has a licence of {', '.join(asked.allow)}"
+            if asked.allow
+            else "is free to be changed and has a motion of known kind"
+        )
+        raise RefusalError(f"no clip may be danced: none {why}")
+    model = hmm_tables.to_model(choreography_model, melody_weight=settings.choreography_model.melody_weight)
+    facts = {row["clip_id"]: row for row in clips.iter_rows(named=True)}
+    pinned = {
+        clip
+        for clip in usable
+        for wish in asked.wishes
+        if not wish.not_label
+        and wish.is_kept_by(clip_id=clip, label=str(facts[clip]["label"]), style=str(facts[clip]["style"]))
+    }
+    clip_ids, motions = _pool(usable, pinned, performed)
+    of = motions.clip_index
+    known = (np.array([str(facts[clip][name]) for clip in clip_ids])[of] for name in ("clip_id", "label", "style"))
+    nodes = Nodes(*known)
+    return Dancer(model, hmm_tables.to_evidence(music_evidence), clip_ids, motions, nodes)
+
+
+def _pool(usable: Mapping[str, ClipMotions], pinned: set[str], performed: set[str]) -> tuple[tuple[str, ...], Motions]:
+    taken: list[str] = []
+    n = 0
+    for clip in sorted(usable, key=lambda c: (c not in pinned, c not in performed, c)):
+        if n >= LARGEST_POOL:
+            break
+        taken.append(clip)
+        n += len(usable[clip].state)
+    taken.sort()
+    return tuple(taken), Motions(
+        np.repeat(np.arange(len(taken)), [len(usable[c].state) for c in taken]),
+        np.concatenate([usable[c].state for c in taken]),
+        np.concatenate([usable[c].start_s for c in taken]),
+        np.concatenate([usable[c].end_s for c in taken]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Music:
+    """A song as the dancer hears it.
+
+    Parameters
+    ----------
+    grid_s : (G + D,) float64, seconds: the G intervals motions take, and D - 1 beyond
+    parts : intervals to a beat
+    is_beat : (G + D,) bool
+    log_likelihood : (G, K) float64, of what sounds in each interval
+    """
+
+    grid_s: Float
+    parts: int
+    is_beat: NDArray[np.bool_]
+    log_likelihood: Float
+
+    @property
+    def longest(self) -> int:
+        """Most intervals that a motion takes, D."""
+        return len(self.grid_s) - len(self.log_likelihood)
+
+
+def by_hmm(
+    dancer: Dancer,
+    percussion: pa.Table,
+    melody: pa.Table,
+    song: PlayedSong,
+    canonical_pose: Stored,
+    settings: Settings,
+    asked: Direction,
+    *,
+    temperature: float | None,
+    seed: int,
+) -> Danced:
+    """Choose basic motions by the model and what the recordings let be joined, then the best recording of each.
+
+    Raises
+    ------
+    RefusalError
+        If the tempo of the song leaves no motion a length it can be danced in, or pins cannot be kept.
+    """
+    warmth = settings.hmm_path.temperature if temperature is None else temperature
+    motions, weights = dancer.motions, settings.hmm_path
+    music = listen(dancer, percussion, melody, song.grid_s, settings)
+    ends = ends_of(motions, dancer.clip_ids, canonical_pose, blend_s=settings.dance.blend_s)
+    places = place(
+        motions,
+        music.grid_s,
+        music.log_likelihood,
+        longest=music.longest,
+        is_beat=music.is_beat,
+        accent=ends.end_accent,
+        warp_weight=weights.warp_weight,
+    )
+    reach = SpanReach(places, parts=music.parts)
+    if not reach.is_danceable:
+        raise RefusalError(_no_length(music, motions.end_s - motions.start_s))
+    pins = hmm_wishes.kept_or_refused(reach, dancer.nodes, song, asked)
+    wishes = [Wish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
+    wish_price = hmm_wishes.price(asked) / music.parts
+    wished = keep_wishes(places, wishes, price=wish_price) if wishes else places
+    crowded = crowded_cost(music.grid_s, song.duration_s, blend_s=settings.dance.blend_s)
+    lasting = _lasting(dancer, music, wished)
+    model = dancer.model
+    if warmth > 0:
+        spans, decoded = (
+            sample_spans(
+                model.log_initial,
+                model.log_transition,
+                music.log_likelihood,
+                lasting,
+                temperature=warmth,
+                rng=np.random.default_rng(seed),
+            ),
+            None,
+        )
+    else:
+        spans, decoded = _decoded(dancer, wished, ends, crowded, settings, seed)
+    chosen = choose_recordings(
+        motions, ends, wished, spans, decoded, crowded, is_beat=music.is_beat, grid_s=music.grid_s, settings=weights
+    )
+    edge_s = np.append(music.grid_s[spans.start], music.grid_s[spans.start[-1] + spans.length[-1]])
+    steps, span_of = to_choreography(
+        chosen.candidates,
+        chosen.found,
+        start_s=edge_s[:-1],
+        end_s=edge_s[1:],
+        beat_s=song.grid_s,
+        clip_ids=dancer.clip_ids,
+        blend_s=settings.dance.blend_s,
+    )
+    steps, kept = trim(steps, song.duration_s)
+    span_of = span_of[kept]
+    width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.dance.blend_s)
+    steps = replace(steps, blend_s=width)
+    model_cost, music_cost = _model_costs(dancer.model, music, spans)
+    unkept = (
+        [w.touched_by(spans.start, spans.length) * ~w.motions[chosen.danced] for w in wishes] if asked.is_soft else []
+    )
+    wish_cost = np.sum([wish_price * n for n in unkept], axis=0) if unkept else np.zeros(len(spans.state))
+    by_span = {**chosen.costs, "wish_cost": wish_cost, "model_cost": model_cost, "music_cost": music_cost}
+    is_first = np.append(True, np.diff(span_of) > 0)
+    columns = {name: np.where(is_first, values[span_of], 0.0) for name, values in by_span.items()}
+    alone = best_spans(dancer.model.log_initial, dancer.model.log_transition, music.log_likelihood, lasting)[0]
+    metadata = {
+        "cost_of_recordings": chosen.found.total_cost,
+        "motions_danced": len(spans.state),
+        "motions_shown_again": int((chosen.found.repetition_cost > 0).sum()),
+        "seams": int(steps.has_seam.sum()),
+        "clips": len(set(steps.clip_id)),
+        "temperature": warmth,
+        "basic_motions_danced": len(np.unique(spans.state)),
+        "as_the_model_alone_ratio": _shared(spans, alone, len(music.log_likelihood)),
+        "music_adds": dancer.evidence.music_adds,
+        "phrases": Markdown(plots.phrase_table(steps)),
+        "states": Markdown(hmm_plots.timeline(edge_s, spans.state, song.grid_s)),
+    }
+    spanned = zip(spans.start[span_of].tolist(), spans.length[span_of].tolist(), strict=True)
+    served = [hmm_wishes.served(pins, music.parts, start, length) for start, length in spanned]
+    return Danced(steps, columns, metadata, served, states=spans.state[span_of])
+
+
+def listen(dancer: Dancer, percussion: pa.Table, melody: pa.Table, beat_s: Float, settings: Settings) -> Music:
+    """Cut the beats as finely as the dancer's motions are short, and hear what sounds in each part."""
+    lengths = dancer.motions.end_s - dancer.motions.start_s
+    parts = durations.parts_per_beat(float(np.median(np.diff(beat_s))), lengths)
+    inner_s = durations.subdivide(beat_s, parts)
+    step_s = float(np.median(np.diff(inner_s)))
+    longest = int(np.clip(np.floor(lengths.max() * durations.MOST_WARP / step_s), 1, LONGEST_SPAN))
+    grid_s = np.append(inner_s, inner_s[-1] + step_s * (1 + np.arange(longest - 1)))
+    heard = hear(percussion, melody, inner_s, symbols=settings.choreography_model.symbols)
+    return Music(grid_s, parts, np.arange(len(grid_s)) % parts == 0, heard.log_likelihood(dancer.model))
+
+
+def _lasting(dancer: Dancer, music: Music, places: Places) -> Float:
+    """Log probabilities of how long basic motions last, (G, D, K); -inf where no recording may be danced."""
+    motions, n = dancer.motions, dancer.model.n_states
+    length_s = motions.end_s - motions.start_s
+    of_state = [length_s[motions.state == k] for k in range(n)]
+    found = durations.log_durations(music.grid_s, of_state, longest=music.longest)
+    there = np.array([[np.bincount(motions.state[fits], minlength=n) for fits, _ in row] for row in places.at])
+    return np.where(there > 0, np.maximum(found, LEAST_LOG), -np.inf)
+
+
+def _decoded(
+    dancer: Dancer, places: Places, ends: Ends, crowded: Float, settings: Settings, seed: int
+) -> tuple[Spans, Chain]:
+    """Find the cheapest dance in recordings."""
+    model, motions, weights = dancer.model, dancer.motions, settings.hmm_path
+    price = np.zeros(len(motions.state))
+    if not len(dancer.evidence.n_motions):
+        price = np.random.default_rng(seed).exponential(UNSURE, len(price))
+    against_usual = model.log_transition + model.entropy_rate
+    chain = decode_varied(
+        motions,
+        link(motions, ends, against_usual, seam_weight=weights.seam_weight),
+        places,
+        model.log_initial,
+        against_usual,
+        price=price,
+        crowded=crowded,
+        repetition_weight=weights.repetition_weight,
+    )
+    return Spans(motions.state[chain.motion], chain.start, chain.length), chain
+
+
+def _model_costs(model: Model, music: Music, spans: Spans) -> tuple[Float, Float]:
+    """Price each span by the model and by the music, (S,) each."""
+    before = np.append(0, spans.state[:-1])
+    log_model = np.where(spans.start == 0, model.log_initial[spans.state], model.log_transition[before, spans.state])
+    running = np.concatenate([np.zeros((1, model.n_states)), np.cumsum(music.log_likelihood, axis=0)])
+    end = np.minimum(spans.start + spans.length, len(music.log_likelihood))
+    return -log_model, running[spans.start, spans.state] - running[end, spans.state]
+
+
+def _shared(spans: Spans, other: Spans, n: int) -> float:
+    """Share of the n intervals in which both dance the same basic motion."""
+    each = [np.repeat(one.state, one.length)[:n] for one in (spans, other)]
+    return float((each[0] == each[1]).mean())
+
+
+def _no_length(music: Music, length_s: Float) -> str:
+    step_s = float(np.median(np.diff(music.grid_s))) * music.parts
+    return (
+        f"no motions of known kinds cover its beats: a beat lasts {step_s:.2f} s and motions {length_s.min():.2f} to "
+        f"{length_s.max():.2f} s; add clips near that tempo, or set beats.octave in the song's brief"
+    )
+
+
+def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
+    """Dance a song by the stored model of the dancer; see :class:`assets.dancing.method.Method`.
+
+    Parameters
+    ----------
+    inputs : the tables of :data:`METHOD`, by name
+    order : DanceOrder
+
+    Raises
+    ------
+    RefusalError
+        As :func:`load_dancer` and :func:`by_hmm`.
+    """
+    dancer = load_dancer(
+        inputs["choreography_model"].read(),
+        inputs["music_evidence"].read(),
+        inputs["key_pose"],
+        {performed.clip_id for performed in hmm_tables.to_performances(inputs["performance"].read())},
+        read_clips(inputs["clip"]),
+        asked=order.direction,
+        settings=order.settings,
+    )
+    with repeatable():
+        return by_hmm(
+            dancer,
+            inputs["percussion"].read(order.song_id),
+            inputs["melody"].read(order.song_id),
+            heard_song(order.beats, order.duration_s),
+            inputs["canonical_pose"],
+            order.settings,
+            order.direction,
+            temperature=order.temperature,
+            seed=order.seed,
+        )
+
+
+METHOD = Method(
+    name="hmm",
+    version="5",
+    inputs=(
+        *("clip", "canonical_pose", "key_pose", "performance"),
+        *("choreography_model", "music_evidence", "percussion", "melody"),
+    ),
+    settings=("hmm_path", "choreography_model", "dance.blend_s"),
+    choose=choose,
+    draws=True,
+    learns=True,
+)

@@ -1,0 +1,321 @@
+"""Poses as pins: which nodes show what a clip shows at a moment, and what a finished dance shows there."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from assets.dancing.wishes import DirectionError, stretch
+from assets.reading.songs import PlayedSong
+from assets.stamps import Stored
+from assets.tables import pack as tables
+from kernels.graph.distance import pose_distance
+from kernels.graph.features import VELOCITY_TIME_S, BeatFeatures, beat_features
+from kernels.graph.path import STEPS
+from kernels.graph.pins import Pin
+from kernels.graph.poses import furthest_ratio, pose_price, pose_ratio, pose_steps
+from kernels.graph.program import StepPrice, step_ends
+from kernels.graph.transitions import THRESHOLD
+from kernels.skeleton.canonical import CANONICAL, mirror
+from kernels.skeleton.kinematics import forward
+from kernels.types import Float, MotionGraph
+from schemas.keys import is_mirrored, mirrored, source_clip
+from schemas.pins import PinWish
+
+ON_TIME_S = 1e-6
+"""A moment this near to a beat is on it, seconds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """The poses of all clips, read as they are asked for.
+
+    Parameters
+    ----------
+    stored : the table ``canonical_pose``
+    threshold : float, > 0
+        Poses are alike below this ratio, as :func:`kernels.graph.poses.pose_ratio` has it, by the metric "position".
+    """
+
+    stored: Stored
+    threshold: float = THRESHOLD
+
+    def read(self, names: Sequence[str]) -> Iterator[tables.CanonicalClip]:
+        """Read some clips; those with names of mirrored ones, mirrored. Clips there are not are left out.
+
+        Parameters
+        ----------
+        names : clips, or mirrored ones as :func:`schemas.keys.mirrored` names them
+
+        Yields
+        ------
+        CanonicalClip, in the stored order
+        """
+        wanted = {source_clip(name) for name in names}
+        for key in self.stored.keys:
+            here = wanted & set(self.stored.stamp(key).clips)
+            for moved in tables.to_canonical_poses(self.stored.read(key, clip_ids=here)) if here else ():
+                if moved.clip_id in names:
+                    yield moved
+                if mirrored(moved.clip_id) in names:
+                    root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
+                    position, _ = forward(CANONICAL, root, turned)
+                    yield tables.CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
+
+    def wanted(self, wish: PinWish) -> BeatFeatures | None:
+        """Take the pose of a wish; None where there is no such clip.
+
+        Parameters
+        ----------
+        wish : PinWish that names a pose
+
+        Returns
+        -------
+        BeatFeatures of that one moment, or None
+
+        Raises
+        ------
+        DirectionError
+            If the moment is not in the clip.
+        """
+        clip, at_s = wish.pose_moment
+        for moved in self.read([clip]):
+            if at_s > moved.duration_s + ON_TIME_S:
+                raise DirectionError(
+                    f"{wish.text}: want a moment of {clip}, 0 to {moved.duration_s:.2f} s, got {at_s:g}"
+                )
+            return _features(moved, np.array([at_s]))
+        return None
+
+    def ratios(
+        self, wanted: Sequence[BeatFeatures], clips: Sequence[str], of_node: Sequence[int], times: Float
+    ) -> Float:
+        """Compare poses with what clips show at some moments.
+
+        Parameters
+        ----------
+        wanted : one pose each
+        clips : names, by clip index
+        of_node : (N,) int, clip of each node
+        times : (T, N) float, seconds of its clip, NaN for none
+
+        Returns
+        -------
+        (len(wanted), 2, T, N) float64
+            Ratios, and roots of the distances in metres; infinite for none.
+        """
+        found = np.full((len(wanted), 2, *times.shape), np.inf)
+        for moved in self.read(clips):
+            nodes = np.flatnonzero(np.asarray(of_node) == clips.index(moved.clip_id))
+            row, at = np.nonzero(np.isfinite(times[:, nodes]))
+            shown = _features(moved, np.clip(times[row, nodes[at]], 0.0, moved.duration_s))
+            for i, pose in enumerate(wanted):
+                found[i, 0, row, nodes[at]] = pose_ratio(pose, shown)[0]
+                found[i, 1, row, nodes[at]] = np.sqrt(pose_distance(pose.pose, shown.pose)[0])
+        return found
+
+
+def to_pose_pins(
+    wishes: Sequence[PinWish],
+    song: PlayedSong,
+    graph: MotionGraph,
+    clip_ids: tuple[str, ...],
+    poses: Poses,
+    *,
+    weight: float,
+) -> dict[str, Pin]:
+    """Bring wishes for poses onto beats and nodes.
+
+    Parameters
+    ----------
+    wishes : PinWish; those for a pose count
+    song : PlayedSong
+    graph, clip_ids : the motion graph of N nodes, and its clips
+    poses : Poses
+    weight : float, >= 0, price of a metre
+
+    Returns
+    -------
+    dict of Pin by the text of its wish
+        The moment is the first beat of the place; at the song's start the first frame, at its end the last. Shown are
+        poses nearer than the threshold; the clip's own nearest moment that the dance can show then, always; where there
+        is neither, the nearest there are. A clip that is not known admits no node.
+
+    Raises
+    ------
+    DirectionError
+        If a place is not in the song, or a moment not in its clip.
+    """
+    asked = [wish for wish in wishes if wish.pose]
+    wanted = [poses.wanted(wish) for wish in asked]
+    places = [_Moment(song, graph, wish) for wish in asked]
+    times = np.concatenate([graph.time_s[None], *(place.times for place in places)])
+    known = [pose for pose in wanted if pose is not None]
+    ratios = iter(poses.ratios(known, clip_ids, graph.clip_index.tolist(), times) if known else ())
+    row, pins = 1, {}
+    for wish, pose, place in zip(asked, wanted, places, strict=True):
+        between, row = slice(row, row + len(place.times)), row + len(place.times)
+        if pose is None:
+            none = np.zeros(len(graph.time_s), bool)
+            pins[wish.text] = Pin(wish.text, place.first, place.first + 1, none)
+        else:
+            shown = _Shown(wish, graph, clip_ids, poses.threshold, weight)
+            pins[wish.text] = _pin(shown, place, next(ratios), times, between, len(song.grid_s) - 1)
+    return pins
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What it costs to show a pose."""
+
+    wish: PinWish
+    graph: MotionGraph
+    clip_ids: tuple[str, ...]
+    threshold: float
+    weight: float
+
+    def price(self, apart: Float, shown_s: Float, is_usable: NDArray[np.bool_]) -> Float:
+        """Price of showing poses, (..., N), by ratios and metres (2, ..., N), and moments; one a row is its own."""
+        clip, at_s = self.wish.pose_moment
+        is_clip = np.array([name == clip for name in self.clip_ids] or [False])[self.graph.clip_index]
+        off_s = np.where(is_clip & is_usable, np.abs(shown_s - at_s), np.inf)
+        is_own = np.isfinite(off_s) & (off_s <= off_s.min(axis=-1, keepdims=True, initial=np.inf) + ON_TIME_S)
+        return pose_price(apart[0], apart[1], is_own, threshold=self.threshold, weight_per_m=self.weight)
+
+
+def _pin(shown: _Shown, place: "_Moment", ratio: Float, times: Float, between: slice, last: int) -> Pin:
+    """Make the pin of one wish; ``ratio`` and ``times`` of the nodes first, of steps over the moment in ``between``."""
+    graph, text = shown.graph, shown.wish.text
+    can_end = np.isin(np.arange(len(graph.time_s)), graph.next_node)
+    starting, ending = (shown.price(ratio[:, 0], graph.time_s, can) for can in (graph.next_node >= 0, can_end))
+
+    def steps_at(beat: int) -> StepPrice:
+        return pose_steps(graph, beat, ending if beat == last else starting, last)
+
+    steps = steps_at(place.beat) if not place.steps else {}
+    if place.steps:
+        price = shown.price(ratio[:, between], times[between], np.isfinite(times[between]))
+        steps = dict(zip(place.steps, price, strict=True))
+    every = np.ones(len(graph.time_s), bool)
+    return Pin(text, place.first, place.first + 1, every, steps, steps_at)
+
+
+class _Moment:
+    """A moment of a song: the beat it is on, or the steps that may pass over it and when in their clips.
+
+    ``first`` is the interval of the pin, ``beat`` the beat where the moment is on one; ``steps`` (music beat, kind) and
+    ``times`` (len(steps), N), NaN where a step cannot be danced, are empty there.
+    """
+
+    def __init__(self, song: PlayedSong, graph: MotionGraph, wish: PinWish) -> None:
+        grid_s = song.grid_s
+        last = len(grid_s) - 1
+        moment_s = moment_of(wish, song)
+        near = int(np.argmin(np.abs(grid_s - moment_s)))
+        self.steps: list[tuple[int, int]] = []
+        self.times = np.zeros((0, len(graph.time_s)))
+        if abs(grid_s[near] - moment_s) <= ON_TIME_S:
+            self.beat, self.first = near, min(near, last - 1)
+            return
+        self.beat = -1
+        self.first = int(np.searchsorted(grid_s, moment_s)) - 1
+        rows = []
+        for kind, ((_, d), end) in enumerate(zip(STEPS, step_ends(graph, STEPS), strict=True)):
+            for at in range(max(self.first - d + 1, 0), min(self.first, last - d) + 1):
+                part = (moment_s - grid_s[at]) / (grid_s[at + d] - grid_s[at])
+                clip_s = graph.time_s[end] - graph.time_s if len(end) else graph.time_s
+                rows.append(np.where(end >= 0, graph.time_s + part * clip_s, np.nan))
+                self.steps.append((at, kind))
+        self.times = np.array(rows).reshape(len(rows), len(graph.time_s))
+
+
+def moment_of(wish: PinWish, song: PlayedSong) -> float:
+    """Find the moment of the song in which a pose is to be shown.
+
+    Parameters
+    ----------
+    wish : PinWish that names a pose
+    song : PlayedSong
+
+    Returns
+    -------
+    float, seconds of the song, >= 0
+
+    Raises
+    ------
+    DirectionError
+        If the place is not in the song.
+    """
+    if wish.place:
+        return 0.0 if wish.place == "start" else song.duration_s
+    return float(max(song.grid_s[stretch(wish, song)[0]], 0.0))
+
+
+def _features(moved: tables.CanonicalClip, time_s: Float, *, velocity_time_s: float = VELOCITY_TIME_S) -> BeatFeatures:
+    return beat_features(
+        moved.rotation_wxyz,
+        moved.position_xyz_m,
+        frame_rate_hz=moved.frame_rate_hz,
+        time_s=time_s,
+        velocity_time_s=velocity_time_s,
+    )
+
+
+def shown_pose(
+    wish: PinWish,
+    moment_s: float,
+    lineage: pl.DataFrame,
+    dance: tables.CanonicalClip,
+    poses: Poses,
+    beats: pl.DataFrame,
+) -> dict[str, Any]:
+    """Tell what a finished dance shows at the moment of a wish for a pose.
+
+    Parameters
+    ----------
+    wish : PinWish for a pose
+    moment_s : float, seconds of the song
+    lineage : rows of ``frame_lineage`` of the dance
+    dance : its frames, as a clip
+    poses : Poses
+    beats : rows of ``motion_graph_node``
+
+    Returns
+    -------
+    dict
+        ``is_kept``; ``at_s``; ``shown_clip_id`` and ``shown_time_s``, what of the catalogue is shown there;
+        ``distance_m``, how far the joints of the finished frame are from the pose in the mean, body to body.
+    """
+    clip, at_s = wish.pose_moment
+    pose = poses.wanted(wish)
+    if pose is None or not len(lineage):
+        return {"is_kept": False, "at_s": moment_s}
+    frame = lineage.row(int(np.argmin(np.abs(lineage["time_s"].to_numpy() - moment_s))), named=True)
+    shown_s = frame["clip_time_s"] + (moment_s - frame["time_s"]) / frame["warp_ratio"]
+    name = mirrored(frame["clip_id"]) if frame["is_mirrored"] else frame["clip_id"]
+    ratio = poses.ratios([pose], [name], [0], np.array([[shown_s]]))[0, 0, 0, 0]
+    own = beats.filter((pl.col("clip_id") == clip) & ~pl.col("is_mirrored") & pl.col("is_kept"))["time_s"].to_numpy()
+    reach_s = max(np.abs(own - at_s).min(), np.diff(own).max(initial=0.0) / 2) if len(own) else 0.0
+    is_own = name == clip and abs(shown_s - at_s) <= reach_s + 0.05
+    is_kept = bool(ratio < poses.threshold or is_own)
+    if not is_kept and not len(own):
+        names = [mirrored(c) if m else c for c, m in beats.filter("is_kept")["clip_id", "is_mirrored"].iter_rows()]
+        every = list(dict.fromkeys(names))
+        time_s = beats.filter("is_kept")["time_s"].to_numpy()[None]
+        of_node = [every.index(name) for name in names]
+        is_kept = bool(ratio <= furthest_ratio(poses.ratios([pose], every, of_node, time_s)[0, 0, 0], poses.threshold))
+    still = [
+        _features(moved, np.array([np.clip(time_s, 0.0, moved.duration_s)]), velocity_time_s=0.0).pose
+        for moved, time_s in ((dance, moment_s), *((moved, at_s) for moved in poses.read([clip])))
+    ]
+    return {
+        "is_kept": is_kept,
+        "at_s": moment_s,
+        "shown_clip_id": source_clip(name),
+        "is_mirrored": is_mirrored(name),
+        "shown_time_s": float(shown_s),
+        "distance_m": float(np.sqrt(pose_distance(still[0], still[1])[0, 0])),
+    }

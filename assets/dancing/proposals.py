@@ -1,0 +1,227 @@
+"""What could be pinned at a place of a song: labels, styles and clips within reach, with what each would cost."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from assets.dancing.asked import Direction
+from assets.dancing.by_graph import Catalogue, path_costs, pins_of, reach_of, search, strength_price, terms_of
+from assets.dancing.wishes import stretch
+from assets.reading.songs import PlayedSong
+from kernels.graph.path import STEPS, first_beats, more_than_any
+from kernels.graph.pins import admitted
+from kernels.graph.program import Program
+from kernels.graph.proposals import Proposals
+from kernels.graph.structure import structure_pins
+from kernels.types import Float, Int
+from schemas.keys import is_mirrored
+from schemas.pins import PinWish, parse_pin
+from schemas.settings import PathSettings, Settings
+
+MOST_PROGRAMS = 100
+"""Names of a kind that are priced over several intervals, those of the least bound first; the rest are told as such."""
+
+KINDS = ("label", "style", "clip")
+_PREFIX = {"label": "", "style": "style:", "clip": "clip:"}
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """A place of a song at which something may be pinned, in seconds and in music intervals first <= k < last."""
+
+    place: str
+    first: int
+    last: int
+    from_s: float
+    to_s: float
+
+
+def place_of(text: str, song: PlayedSong) -> Asked:
+    """Find a place as a pin names it: ``42``, ``12.5-16``, ``beat:8``, ``bar:3-4``, ``start``, ``end``.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or not in the song.
+    """
+    wish: PinWish = parse_pin(f"{text}=anything")
+    first, last = stretch(wish, song)
+    return Asked(text, first, last, float(max(song.grid_s[first], 0.0)), float(min(song.grid_s[last], song.duration_s)))
+
+
+def propose(known: Catalogue, song: PlayedSong, settings: Settings, asked: Direction, place: Asked) -> dict[str, Any]:
+    """Price everything that could be pinned at a place, other pins kept.
+
+    Parameters
+    ----------
+    known, song, settings, asked : as :func:`assets.dancing.by_graph.by_graph` has them
+    place : Asked
+
+    Returns
+    -------
+    dict
+        ``best_cost``, and ``labels``, ``styles`` and ``clips``, the cheapest first: name, the pin to write,
+        ``extra_cost`` over the best dance with the pins that are asked for already, and how many clips it has there;
+        ``out_of_reach``, names by kind; ``unpriced_clips`` and the like where a stretch has more than
+        :data:`MOST_PROGRAMS` candidates. Costs are those of the dynamic program: exact, all but the price of showing
+        the same again over the whole song. With ``repeat = "structure"`` the parts that come again are those of the
+        best dance, all but the intervals of the place and those that are to show the same.
+
+    Raises
+    ------
+    RefusalError
+        If the pins that are asked for cannot be kept.
+    """
+    solved = list(_solved(known, song, settings.path, asked, place))
+    if not solved:
+        return {"best_cost": None, "labels": [], "styles": [], "clips": [], "out_of_reach": {}}
+    most = solved[0][1]
+    found: dict[str, Any] = {"best_cost": solved[0][0].best_cost % most, "out_of_reach": {}}
+    for kind in KINDS:
+        every = getattr(known.nodes, "clip_id" if kind == "clip" else kind)
+        names, first, group = np.unique(every, return_index=True, return_inverse=True)
+        is_named = (names != "") & (np.bincount(group, known.is_allowed, minlength=len(names)) > 0)
+        prices = _price(solved, place, group, len(names), is_named)
+        rows = [
+            {
+                kind: str(names[i]),
+                "pin": f"{place.place}={_PREFIX[kind]}{names[i]}",
+                "extra_cost": float(prices.cost[i] % most) - found["best_cost"],
+                "steps_outside_warp_bounds": int(prices.cost[i] // most),
+                **(
+                    _of_clip(known, place, first[i], prices.node[i])
+                    if kind == "clip"
+                    else _of_many(known, group == i, prices.node[i])
+                ),
+            }
+            for i in np.flatnonzero(is_named & np.isfinite(prices.cost)).tolist()
+        ]
+        found[f"{kind}s"] = sorted(rows, key=lambda row: (row["steps_outside_warp_bounds"], row["extra_cost"]))
+        found["out_of_reach"][f"{kind}s"] = names[is_named & np.isinf(prices.cost) & ~prices.is_left].tolist()
+        found[f"unpriced_{kind}s"] = names[prices.is_left].tolist()
+    return found
+
+
+def _of_clip(known: Catalogue, place: Asked, node: int, best: int) -> Mapping[str, Any]:
+    """Tell of a clip what is seen of it where it is cheapest; a pin cannot name the pose of a mirror image."""
+    shown = node if best < 0 else best
+    told = {"label": str(known.nodes.label[shown]), "style": str(known.nodes.style[shown])}
+    if best < 0:
+        return told
+    at_s = float(known.graph.time_s[best])
+    is_image = is_mirrored(known.clip_ids[known.graph.clip_index[best]])
+    pose = {} if is_image else {"pose_pin": f"{place.place}=pose:{known.nodes.clip_id[best]}@{at_s:.3f}"}
+    return {**told, "clip_time_s": at_s, "is_mirrored": is_image, **pose}
+
+
+def _of_many(known: Catalogue, nodes: NDArray[np.bool_], best: int) -> Mapping[str, Any]:
+    cheapest = {} if best < 0 else {"cheapest_clip": str(known.nodes.clip_id[best])}
+    return {"clip_count": len(np.unique(known.nodes.clip_id[nodes])), **cheapest}
+
+
+@dataclass(frozen=True, eq=False)
+class _Prices:
+    """Of each name: cost, infinite where out of reach; first node, -1 where not known; whether it was not looked at."""
+
+    cost: Float
+    node: Int
+    is_left: NDArray[np.bool_]
+
+
+def _price(
+    solved: list[tuple[Proposals, float]], place: Asked, group: Int, n: int, is_named: NDArray[np.bool_]
+) -> _Prices:
+    """Price dancing the nodes of each group at a place, by the first of the solved songs that can.
+
+    Over several intervals each group takes a program of its own; the cheapest step in each interval is a bound that
+    says which are worth it.
+    """
+    prices = _Prices(np.full(n, np.inf), np.full(n, -1), np.zeros(n, bool))
+    for proposals, _ in solved:
+        todo = is_named & np.isinf(prices.cost)
+        bound = np.zeros(n)
+        for interval in range(place.first, place.last):
+            least, node = _least(proposals.through(interval), group, n)
+            bound = np.maximum(bound, least)
+        if place.last == place.first + 1:
+            prices.cost[todo], prices.node[todo] = bound[todo], node[todo]
+            continue
+        likely = np.flatnonzero(todo & np.isfinite(bound))
+        likely = likely[np.argsort(bound[likely], kind="stable")]
+        for i in likely[:MOST_PROGRAMS].tolist():
+            prices.cost[i] = proposals.within(place.first, place.last, group == i)
+        prices.is_left[likely[MOST_PROGRAMS:]] = True
+    prices.is_left[np.isfinite(prices.cost)] = False
+    return prices
+
+
+def _least(through: Float, group: Int, n: int) -> tuple[Float, Int]:
+    """Least cost of each group, (n,), and its first node, -1 for none."""
+    order = np.lexsort((np.arange(len(group)), through, group))
+    least, node = np.full(n, np.inf), np.full(n, -1)
+    of, first = np.unique(group[order], return_index=True)
+    least[of], node[of] = through[order[first]], order[first]
+    return least, node
+
+
+def _solved(
+    known: Catalogue, song: PlayedSong, settings: PathSettings, asked: Direction, place: Asked
+) -> Iterator[tuple[Proposals, float]]:
+    """Solve the song as the search would: from first beats, then from any, past the bounds where there is no other way.
+
+    The first one is the search's own; those after it are tried for what the ones before cannot have.
+    """
+    graph, costs = known.graph, path_costs(settings)
+    pins = pins_of(known, song, asked)
+    terms = terms_of(known, song, pins, asked, costs, strength_price(known, song, settings))
+    mask = np.ascontiguousarray(terms.admissible)
+    every = np.flatnonzero(known.is_allowed)
+    reach = reach_of(known, song, costs)
+    if not reach.is_danceable:
+        return
+    wished: dict[str, Any] = {"interval_price": terms.interval_price, "step_price": terms.step_price}
+    if settings.repeat == "structure" and song.repeats:
+        best = search(graph, song.grid_s, costs, admissible=mask, from_any=terms.from_any, **wished)
+        own, _ = structure_pins(best, song.repeats, reach, kept=[] if asked.is_soft else pins)
+        free = _shown_with(place, song)
+        mask = mask & admitted([pin for pin in own if pin.first not in free], *mask.shape)
+    most = more_than_any(graph, song.grid_s, costs=costs, **wished)
+    is_begun = False
+    for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
+        program = Program(
+            graph,
+            song.grid_s,
+            steps=STEPS,
+            costs=costs,
+            admissible=mask,
+            bounds=bounds,
+            outside_price=price,
+            **wished,
+        )
+        first = [] if terms.from_any else [np.intersect1d(first_beats(graph), every)]
+        for starts in (*first, every):
+            proposals = Proposals(program, starts)
+            if is_begun or np.isfinite(proposals.best_cost):
+                is_begun = True
+                yield proposals, most
+        if bounds == reach.bounds:
+            return
+
+
+def _shown_with(place: Asked, song: PlayedSong) -> set[int]:
+    """Music intervals of a place, and all that repeat them or that they repeat."""
+    found = set(range(place.first, place.last))
+    while True:
+        more = {
+            other
+            for r in song.repeats
+            for later in range(r.first, r.last)
+            for k, other in ((later, r.source + later - r.first), (r.source + later - r.first, later))
+            if k in found
+        }
+        if more <= found:
+            return found
+        found |= more

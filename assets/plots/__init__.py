@@ -1,0 +1,1 @@
+"""Pictures of what is made, one file an area."""

@@ -1,0 +1,1 @@
+"""Stored rows to records, each read in one place."""

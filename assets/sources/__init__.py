@@ -1,0 +1,1 @@
+"""What lies in a studio: files, folders, performances, recordings of suits."""

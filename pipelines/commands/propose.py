@@ -1,0 +1,125 @@
+"""What could be pinned at a place of a song: read from the lake, told to a person and to a machine."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from assets.dancing import proposals
+from assets.dancing.asked import direction_of
+from assets.dancing.by_graph import catalogue, poses_of
+from assets.dancing.methods import USUAL
+from assets.dancing.refusal import RefusalError
+from assets.reading.clips import read_clips
+from assets.reading.songs import heard_song
+from assets.tables import pack as tables
+from pipelines import build as building
+from pipelines.commands.asked import pin_texts, wanted_songs
+from pipelines.commands.outcome import DONE, NOTHING_DONE, Outcome
+from pipelines.commands.session import Session
+from pipelines.io_managers import StoredTable
+from pipelines.studio.files import LakeError, StudioError
+from pipelines.studio.folder import StudioFolder, existing
+
+LONGEST_TABLE = 12
+
+
+def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> Outcome:
+    """Price what could be pinned at a place of a song.
+
+    Parameters
+    ----------
+    studio : with the motion graph and the song's beats in its lake
+    song : its key
+    place : as a pin names it
+    pins : to be kept beside those of the brief
+
+    Raises
+    ------
+    StudioError
+        If the place is none of the song's.
+    """
+    lake = studio.lake
+    beats = tables.to_music_beat(lake.table("music_beat", song))
+    if len(beats.time_s) < 2:
+        raise StudioError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
+    duration_s = float(max(lake.table("song", song)["duration_s"].to_pylist()))
+    feature, repeat = (lake.table(name, song) for name in ("music_feature", "music_repeat"))
+    played = heard_song(beats, duration_s, feature=feature, repeat=repeat)
+    try:
+        at = proposals.place_of(place, played)
+    except ValueError as error:
+        raise StudioError(f"--propose: {str(error).replace(f'{place}=anything', place)}") from error
+    asked = direction_of(studio, f"{song}|graph", pins=pins)
+    graph, clip_ids = tables.to_motion_graph(lake.table("motion_graph_node"), lake.table("motion_graph_edge"))
+    clips = read_clips(StoredTable(lake, "clip", lake.keys("clip")))
+    poses = poses_of(StoredTable(lake, "canonical_pose", lake.keys("canonical_pose")), studio.settings())
+    known = catalogue(graph, clip_ids, clips, asked.allow, poses=poses)
+    try:
+        found = proposals.propose(known, played, studio.settings(), asked, at)
+    except RefusalError as refused:
+        facts = {"error": refused.sentence, **refused.facts}
+        return Outcome(NOTHING_DONE, facts, troubles=[refused.sentence])
+    said: dict[str, Any] = {"song": song, "place": place, "from_s": at.from_s, "to_s": at.to_s}
+    facts = {**said, "pins": [wish.text for wish in asked.wishes], **found}
+    if found["best_cost"] is None:
+        trouble = f"{song}: cannot be danced at all with what may be danced; 'odori dance' says why"
+        return Outcome(NOTHING_DONE, {"error": trouble}, troubles=[trouble])
+    return Outcome(DONE, facts, _report(facts))
+
+
+def _report(facts: Mapping[str, Any]) -> str:
+    """Tell a person: one table a kind, the cheapest first."""
+    pins = f", with {', '.join(facts['pins'])}" if facts["pins"] else ""
+    lines = [
+        f"{facts['song']} from {facts['from_s']:.2f} to {facts['to_s']:.2f} s: what could be pinned there{pins}",
+        f"costs beyond the best dance's {facts['best_cost']:.2f}; a seam is about 1",
+    ]
+    for kind in ("labels", "styles", "clips"):
+        rows = facts[kind]
+        lost = facts["out_of_reach"][kind]
+        if not rows and not lost:
+            continue
+        lines.append(f"{kind}: {len(rows)} within reach, {len(lost)} not")
+        lines += [f"  {_price(row):>9}  {row['pin']}{_also(row)}" for row in rows[:LONGEST_TABLE]]
+        if len(rows) > LONGEST_TABLE:
+            lines.append(f"             … and {len(rows) - LONGEST_TABLE} more, up to {_price(rows[-1])}: see --json")
+    return "\n".join(lines)
+
+
+def _price(row: Mapping[str, Any]) -> str:
+    return f"{max(row['extra_cost'], 0.0) if abs(row['extra_cost']) < 0.005 else row['extra_cost']:+.2f}"
+
+
+def _also(row: Mapping[str, Any]) -> str:
+    told = []
+    if "clip_count" in row:
+        told.append(f"{row['clip_count']} clip{'s' * (row['clip_count'] != 1)}")
+    else:
+        told += [text for text in (row["label"], row["style"]) if text]
+    if row["steps_outside_warp_bounds"]:
+        told.append(f"{row['steps_outside_warp_bounds']} steps beyond the bounds of warp")
+    return f"  ({', '.join(told)})" if told else ""
+
+
+def propose_pins(
+    root: Path,
+    wanted: str,
+    place: str,
+    *,
+    pins: Sequence[str] = (),
+    progress: Callable[[], Any],
+) -> Outcome:
+    """List what could be pinned at a place of a song, building first what that takes; nothing is danced."""
+    studio = existing(root)
+    pins = pin_texts(pins, root, progress)
+    work = Session(studio, progress)
+    songs = wanted_songs(work.state, [wanted], studio)
+    if len(songs) > 1:
+        raise StudioError(f"--propose: want one song, got {len(songs)}")
+    key = f"{songs[0].key}|{USUAL}"
+    needed = {name for name in work.state.needed_for(key) if work.state.assets[name].kind != "dance"}
+    report = work.run(building.GROUPS, keys=lambda kind, one: kind != "song" or one == songs[0].key, assets=needed)
+    try:
+        return priced(studio, songs[0].key, place, pins)
+    except LakeError as error:
+        raise StudioError("; ".join([str(error), *report.failed])) from error

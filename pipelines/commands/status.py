@@ -1,0 +1,170 @@
+"""What a studio's files and partitions are: read or refused, fresh or not, and why."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from assets.stamps import content_version
+from pipelines import build as building
+from pipelines.collection import freshness
+from pipelines.commands import device_report
+from pipelines.commands.outcome import DONE, SOME_REFUSED, Outcome
+from pipelines.freshness import Finding, Freshness
+from pipelines.studio.folder import StudioFolder, existing
+from schemas.motion import CANONICAL_POSE
+from schemas.music import SONG
+
+LONGEST_LIST = 40
+
+
+def status(root: Path, *, devices: bool = False) -> Outcome:
+    """Say what is fresh, stale, failed or refused; of the devices too, for which no studio is needed."""
+    if devices:
+        of_devices = device_report.report(root)
+        if not root.is_dir():
+            return of_devices
+        found = status(root)
+        return Outcome(
+            max(found.status, of_devices.status),
+            found.facts | of_devices.facts,
+            f"{found.report}\n{of_devices.report}",
+            [*found.troubles, *of_devices.troubles],
+        )
+    studio = existing(root)
+    state = freshness(studio)
+    (clips, doubts), songs = _clips_and_doubts(state, studio), songs_of(state, studio)
+    failures = building.last_failures(building.open_instance(studio)) if studio.dagster_home.is_dir() else {}
+    assets = [_asset_facts(f, state, failures) for f in state.findings()]
+    refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
+    notes = list(state.sources.notes)
+    facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes, "warnings": doubts}
+    report = _status_report(studio, clips, songs, assets, refused, notes, doubts)
+    return Outcome(SOME_REFUSED if refused else DONE, facts, report)
+
+
+def _asset_facts(finding: Finding, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:
+    failure = failures.get((finding.asset, finding.key)) if finding.state in ("stale", "missing") else None
+    return {
+        "asset": finding.asset,
+        "partition": finding.key,
+        "group": state.assets[finding.asset].group,
+        "state": "failed" if failure else finding.state,
+        "why": failure or finding.why,
+    }
+
+
+def _status_report(
+    studio: StudioFolder,
+    clips: list[dict[str, Any]],
+    songs: list[dict[str, Any]],
+    assets: list[dict[str, Any]],
+    refused: list[dict[str, Any]],
+    notes: list[str],
+    doubts: list[dict[str, str]],
+) -> str:
+    lines = [f"studio {studio.root}"]
+    for name, files in (("clips", clips), ("songs", songs)):
+        by_state = counts(files)
+        lines.append(
+            f"  {name}: " + ", ".join(f"{n} {state}" for state, n in by_state.items() if n) + ("" if files else "none")
+        )
+    unfresh = [a for a in assets if a["state"] != "fresh"]
+    lines.append(f"  assets: {len(assets) - len(unfresh)} partitions fresh, {len(unfresh)} not")
+    unmade = _unmade(unfresh)
+    lines += unmade[:LONGEST_LIST] + _more(unmade)
+    lines += [f"  {line}" for line in refusals(refused)]
+    doubtful = [f"  warning: {doubt['path']}: {doubt['warning']}" for doubt in doubts]
+    lines += doubtful[:LONGEST_LIST] + _more(doubtful)
+    lines += [f"  note: {note}" for note in notes]
+    return "\n".join(lines)
+
+
+def _unmade(assets: Iterable[dict[str, Any]]) -> list[str]:
+    """Say what is not fresh, partitions that are so for one reason in one line."""
+    alike: dict[tuple[str, str, str], list[str]] = {}
+    for facts in assets:
+        alike.setdefault((facts["state"], facts["asset"], facts["why"]), []).append(facts["partition"])
+    lines: list[str] = []
+    for (condition, asset, why), keys in alike.items():
+        which = ", ".join(keys[:3]) + (f" and {len(keys) - 3} more" if len(keys) > 3 else "")
+        lines.append(f"    {condition}: {asset}[{which}]: {why}")
+    return lines
+
+
+def clips_of(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
+    """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
+    return _clips_and_doubts(state, studio)[0]
+
+
+def _clips_and_doubts(state: Freshness, studio: StudioFolder) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+    """List the motion files, and what is doubtful about those that were read."""
+    stored = {}
+    for session in studio.lake.keys("clip"):
+        if studio.lake.stamp("clip", session) is None:  # of an older version: as if it were not there
+            continue
+        for row in studio.lake.table("clip", session).to_pylist():
+            stored[row["path"]] = row
+    unplaced = {session: _unplaced(state, session) for session in studio.lake.keys("canonical_pose")}
+    found: list[dict[str, Any]] = []
+    doubts: list[dict[str, str]] = []
+    for clip in state.sources.clips:
+        path = clip.path.encode("utf-8", "backslashreplace").decode()
+        row = stored.get(path)
+        seen = _seen(row, clip.sha256, clip.problem)
+        if seen["state"] == "read" and clip.key in unplaced.get(clip.session, ()):
+            seen = {"state": "refused", "reason": "its motion could not be brought to the canonical skeleton"}
+        warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
+        found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
+        doubts += [{"path": path, "warning": sentence} for sentence in warnings]
+    return found, doubts
+
+
+def _unplaced(state: Freshness, session: str) -> set[str]:
+    """Clips of a session that were read and have no canonical pose."""
+    stamp = state.stamp("canonical_pose", session)
+    return {clip for clip, made in stamp.clips.items() if made.content == _NO_POSE} if stamp else set()
+
+
+_NO_POSE = content_version(CANONICAL_POSE.empty())
+
+
+def songs_of(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
+    """List every music file with its state."""
+    stored = {}
+    for key in studio.lake.keys(SONG.name):
+        for row in studio.lake.table(SONG.name, key).to_pylist():
+            stored[row["path"]] = row
+    found = []
+    for song in state.sources.songs:
+        path = song.path.encode("utf-8", "backslashreplace").decode()
+        found.append({"path": path, "key": song.key, **_seen(stored.get(path), song.sha256, song.problem)})
+    return found
+
+
+def _seen(row: dict[str, Any] | None, sha256: str, problem: str) -> dict[str, Any]:
+    if problem:
+        return {"state": "refused", "reason": problem}
+    if row is None:
+        return {"state": "new", "reason": None}
+    if row["source_sha256"] != sha256:
+        return {"state": "changed", "reason": None}
+    return {"state": row["state"], "reason": row["reason"]}
+
+
+def counts(files: list[dict[str, Any]]) -> dict[str, int]:
+    """Count the files in each state."""
+    return {state: sum(f["state"] == state for f in files) for state in ("read", "refused", "new", "changed")}
+
+
+def any_read(*lists: list[dict[str, Any]]) -> bool:
+    """Whether one file at least could be read."""
+    return any(f["state"] == "read" for files in lists for f in files)
+
+
+def refusals(refused: list[dict[str, Any]]) -> list[str]:
+    """Say which files are refused, a line each."""
+    return [f"refused: {f['path']}: {f['reason']}" for f in refused]
+
+
+def _more(items: Sequence[object]) -> list[str]:
+    return [f"    … and {len(items) - LONGEST_LIST} more"] if len(items) > LONGEST_LIST else []

@@ -1,0 +1,1 @@
+"""The studio on disk: folder, lake, files. Knows no Dagster."""
