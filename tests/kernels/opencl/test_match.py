@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pyopencl as cl
 import pytest
@@ -134,7 +136,7 @@ def test_parts_of_a_catalogue_share_a_song(program):
     first = matcher.matches(segments, clips[:10], k=4)
     floors = [found[-1].score if len(found) == 4 else -1 for found in first]
     second = matcher.matches(segments, clips[10:], k=4, floors=floors)
-    second = [[module.replace(m, clip_index=m.clip_index + 10) for m in found] for found in second]
+    second = [[replace(m, clip_index=m.clip_index + 10) for m in found] for found in second]
     assert merge_matches([first, second], k=4) == whole
     with pytest.raises(ValueError, match="floors: want one a segment"):
         matcher.matches(segments, clips, k=4, floors=[0.0])
