@@ -25,13 +25,14 @@ import numpy as np
 REPOSITORY = Path(__file__).parents[1]
 sys.path.insert(0, str(REPOSITORY))
 
-from assets import tables  # noqa: E402
 from assets.formats import bvh, midi  # noqa: E402
+from assets.tables import pack as tables  # noqa: E402
 from kernels.hmm.character import chance_of, nearest_dancer, pose_windows  # noqa: E402
 from kernels.synthetic import performance as made_up  # noqa: E402
 from kernels.types import Float  # noqa: E402
 from pipelines.commands.dance import dance_songs  # noqa: E402
-from pipelines.resources import NoProgress, StudioFolder  # noqa: E402
+from pipelines.resources import NoProgress
+from pipelines.studio.folder import StudioFolder  # noqa: E402
 
 DATA = Path(os.environ.get("ODORI_TEST_DATA", REPOSITORY.parent / "shared" / "data"))
 N_REAL_TAKES = 5

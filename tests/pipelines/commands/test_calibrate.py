@@ -151,5 +151,5 @@ def test_what_is_no_recording(tmp_path, name, data, word):
 
 
 def test_dagster_is_not_loaded_for_it():
-    code = "import sys, pipelines.calibrate; sys.exit('dagster' in sys.modules)"
+    code = "import sys, pipelines.commands.calibrate; sys.exit('dagster' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
