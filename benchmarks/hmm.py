@@ -34,7 +34,7 @@ from kernels.hmm.evidence import measure  # noqa: E402
 from kernels.hmm.viterbi import viterbi  # noqa: E402
 from kernels.synthetic import performance as made_up  # noqa: E402
 from pipelines.commands.dance import dance_songs  # noqa: E402
-from pipelines.resources import NoProgress
+from pipelines.resources import NoProgress  # noqa: E402
 from pipelines.studio.folder import StudioFolder  # noqa: E402
 from pipelines.studio.lake import Lake  # noqa: E402
 

@@ -31,7 +31,7 @@ from kernels.hmm.character import chance_of, nearest_dancer, pose_windows  # noq
 from kernels.synthetic import performance as made_up  # noqa: E402
 from kernels.types import Float  # noqa: E402
 from pipelines.commands.dance import dance_songs  # noqa: E402
-from pipelines.resources import NoProgress
+from pipelines.resources import NoProgress  # noqa: E402
 from pipelines.studio.folder import StudioFolder  # noqa: E402
 
 DATA = Path(os.environ.get("ODORI_TEST_DATA", REPOSITORY.parent / "shared" / "data"))
