@@ -23,7 +23,7 @@ from kernels.matching.score import SCALES, Match, merge_matches, numerators, rat
 MEMORY_BYTES = 2**31
 _MOST_FRAMES = 2**30
 _TOGETHER = 512  # segments of one search
-_LONGER = 1.15  # times the shortest: the longest segment of one search
+_LONGER = 1.6  # times the shortest: the longest segment of one search
 _SPARSE = 0.25  # share of frames with music
 # largest values for which products neither overflow nor lose what a score is made of
 _SIZES = (2.0**-400, 2.0**400)
