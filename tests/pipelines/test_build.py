@@ -233,7 +233,7 @@ def test_freshness_says_why(studio):
 
 def test_a_build_in_another_process_holds_the_studio_and_lets_go_when_it_is_killed(studio):
     code = (
-        "import pathlib, sys, time; from pipelines import build; from pipelines.resources import StudioFolder\n"
+        "import pathlib, sys, time; from pipelines import build; from pipelines.studio.folder import StudioFolder\n"
         "with build.exclusive(StudioFolder(pathlib.Path(sys.argv[1]))): print('held', flush=True); time.sleep(60)"
     )
     holder = subprocess.Popen([sys.executable, "-c", code, str(studio)], stdout=subprocess.PIPE)
