@@ -332,7 +332,7 @@ def try_alone(index: int, device: Any) -> str:  # noqa: ANN401 - a cl.Device
     -------
     str, why it cannot be used, one line; empty where it can
     """
-    command = [sys.executable, "-P", "-m", "kernels.opencl.trial", str(index)]
+    command = [sys.executable, "-P", "-m", "pipelines.device_trial", str(index)]
     try:
         done = subprocess.run(command, capture_output=True, timeout=TRIAL_S, check=False, stdin=subprocess.DEVNULL)
     except subprocess.TimeoutExpired:

@@ -1,21 +1,12 @@
-"""Trying a device: whether it builds and runs a small kernel, and computes right.
-
-    python -m kernels.opencl.trial INDEX
-
-tries one device in a process of its own, where a driver that crashes or hangs harms nothing, and prints one JSON
-object.
-"""
+"""Trying a device: whether it builds and runs a small kernel, and computes right."""
 
 from __future__ import annotations
-
-import json
-import sys
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.opencl.device import build, list_devices
+from kernels.opencl.device import build
 
 VERSION = "1"
 """Raised by hand when the trial asks for more: what was remembered of it counts no longer."""
@@ -114,14 +105,3 @@ def _run(device: cl.Device) -> tuple[NDArray[np.float64], ...]:
         cl.enqueue_copy(queue, array, answer)
     counted = np.array([whole[0][0], whole[1].view(np.float32)[0]], np.float64)
     return *(array.astype(np.float64) for array in real), counted
-
-
-def main() -> None:
-    """Try the device of the index given and print ``{"reason": ""}``, or why it is of no use."""
-    devices, index = list_devices(), int(sys.argv[1])
-    reason = fault(devices[index]) if index < len(devices) else "is not there any more"
-    sys.stdout.write(json.dumps({"reason": reason}) + "\n")
-
-
-if __name__ == "__main__":
-    main()

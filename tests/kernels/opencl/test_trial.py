@@ -1,7 +1,3 @@
-import json
-import subprocess
-import sys
-
 import numpy as np
 import pyopencl as cl
 import pytest
@@ -75,12 +71,3 @@ def test_the_compilers_first_line_is_the_one_told():
 @pytest.mark.parametrize(("error", "line"), [(ValueError(), "ValueError"), (ValueError("a\nb"), "a")])
 def test_other_errors_are_told_by_their_first_line(error, line):
     assert first_line(error) == line
-
-
-def test_alone_it_answers_with_one_object():
-    command = [sys.executable, "-m", "kernels.opencl.trial"]
-    for index in range(len(DEVICES)):
-        done = subprocess.run([*command, str(index)], capture_output=True, text=True, check=True)
-        assert json.loads(done.stdout) == {"reason": ""}
-    done = subprocess.run([*command, str(len(DEVICES))], capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout) == {"reason": "is not there any more"}
