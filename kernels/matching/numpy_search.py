@@ -16,11 +16,11 @@ from threadpoolctl import threadpool_limits
 
 from kernels.matching.blocks import rows
 from kernels.matching.bounds import SumTables
-from kernels.matching.catalogue import Catalogue, Chunk, Series, Song, check_search, portions
+from kernels.matching.catalogue import Chunk, Series, Song, portions
+from kernels.matching.chunked import ChunkedSearch
 from kernels.matching.refinement import PAIRS, PLACE_BITS, STAGES, Refinement
-from kernels.matching.score import SCALES, Match, merge_matches, numerators, ratios, sums_of_candidates
+from kernels.matching.score import Match, ratios, sums_of_candidates
 
-MEMORY_BYTES = 2**31
 _MOST_FRAMES = 2**30
 _TOGETHER = 512  # segments of one search
 _LONGER = 1.6  # times the shortest: the longest segment of one search
@@ -29,104 +29,16 @@ _SPARSE = 0.25  # share of frames with music
 _SIZES = (2.0**-400, 2.0**400)
 
 
-class NumpyMatcher:
-    """The pruned search without a device.
+class NumpyMatcher(ChunkedSearch[SumTables]):
+    """The pruned search without a device; see :class:`kernels.matching.chunked.ChunkedSearch`.
 
-    Parameters
-    ----------
-    memory_bytes : int
-        Memory for clips, their block sums, and bounds of pairs; more clips are taken chunk by chunk.
-
-    Raises
-    ------
-    ValueError
-        If the memory is not > 0.
+    Its memory is the host's: clips, their block sums, and the bounds of pairs.
     """
-
-    def __init__(self, *, memory_bytes: int = MEMORY_BYTES) -> None:
-        if memory_bytes <= 0:
-            raise ValueError(f"memory_bytes: want > 0, got {memory_bytes}")
-        self.memory_bytes = memory_bytes
 
     @property
     def name(self) -> str:
         """What computes, for metadata."""
         return "reference"
-
-    def index(self, clips: Iterable[Series], *, scales: Sequence[float] = SCALES) -> Catalogue[SumTables]:
-        """Prepare a catalogue for many songs.
-
-        Parameters
-        ----------
-        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys
-        scales : rising multiples of 1/50
-
-        Returns
-        -------
-        Catalogue
-            Its block sums are made by the first search and kept if all fit into the memory allowed; else they are
-            made anew, chunk by chunk, by every search.
-
-        Raises
-        ------
-        ValueError
-            If a clip is not (F,), not finite or negative; or the scales are not as wanted.
-        """
-        fiftieths = numerators(scales)
-        chunks = list(self._chunks(clips, fiftieths, n_segments=0))
-        return Catalogue(chunks, fiftieths=fiftieths, is_resident=len(chunks) <= 1)
-
-    def matches(
-        self,
-        segments: Sequence[Series],
-        clips: Iterable[Series] | Catalogue[SumTables],
-        *,
-        k: int,
-        scales: Sequence[float] = SCALES,
-        floors: Sequence[float] | None = None,
-    ) -> list[list[Match]]:
-        """Find the k best clips of every segment.
-
-        Parameters
-        ----------
-        segments : sequence of (L,) float, L >= 1, finite, >= 0
-        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys; or their index
-            An iterable is read once, a chunk at a time.
-        k : int, >= 1
-        scales : rising multiples of 1/50
-        floors : sequence of S float, or None
-            Scores that k clips elsewhere are known to reach, as when many workers share a song: worse ones may be left
-            out here. What :func:`kernels.matching.score.merge_matches` makes of all parts stays the same.
-
-        Returns
-        -------
-        list, one a segment, of lists of Match
-            As :func:`kernels.matching.score.reference_matches`, to the bit.
-
-        Raises
-        ------
-        ValueError
-            As the reference; or if an index was made for other scales, or there is not one floor a segment.
-        """
-        fiftieths = numerators(scales)
-        segments = [np.asarray(segment) for segment in segments]
-        given = check_search(segments, clips, k=k, fiftieths=fiftieths, floors=floors)
-        found: list[list[Match]] = [[] for _ in segments]
-        if not segments:
-            return found
-        song = Song(segments, k=k, fiftieths=fiftieths)
-        is_kept = isinstance(clips, Catalogue) and clips.is_resident
-        chunks = (
-            clips.chunks if isinstance(clips, Catalogue) else self._chunks(clips, fiftieths, n_segments=len(segments))
-        )
-        # products are small: a second thread would mostly wait
-        with threadpool_limits(limits=1, user_api="blas"):
-            for chunk in chunks:
-                reached = [matches[-1].score if len(matches) == k else -1.0 for matches in found]
-                floor = np.maximum(given, reached)
-                part = self._search(song, chunk, floor, is_kept=is_kept)
-                found = merge_matches([found, song.with_silences(part, chunk, floor=floor)], k=k)
-        return found
 
     def _chunks(
         self, clips: Iterable[Series], fiftieths: tuple[int, ...], *, n_segments: int
@@ -142,6 +54,15 @@ class NumpyMatcher:
             yield Chunk(first, some)
 
     def _search(
+        self, song: Song, chunk: Chunk[SumTables], floor: NDArray[np.float64], *, is_kept: bool
+    ) -> list[list[Match]]:
+        """Search one chunk."""
+        # products are small: a second thread would mostly wait
+        with threadpool_limits(limits=1, user_api="blas"):
+            found = self._search_sounding(song, chunk, floor, is_kept=is_kept)
+        return song.with_silences(found, chunk, floor=floor)
+
+    def _search_sounding(
         self, song: Song, chunk: Chunk[SumTables], floor: NDArray[np.float64], *, is_kept: bool
     ) -> list[list[Match]]:
         """Find the matches of segments and clips that are not silent."""

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.matching.catalogue import Catalogue, Chunk, Series, Song, check_search, portions
+from kernels.matching.catalogue import Chunk, Series, Song, portions
+from kernels.matching.chunked import MEMORY_BYTES, ChunkedSearch
 from kernels.matching.plan import PLANS, Plan, bytes_a_frame
 from kernels.matching.score import (
-    SCALES,
     Match,
     merge_matches,
-    numerators,
     ratios,
     sums_of_candidates,
 )
@@ -25,24 +24,10 @@ from kernels.opencl.match_stages import Stages, wants_safe
 from kernels.opencl.match_tables import Tables
 from kernels.opencl.match_tuning import pick_plan
 
-MEMORY_BYTES = 2**31
 _CANDIDATES = 2**14
 
 
-class ClipIndex(Catalogue[Tables]):
-    """A catalogue prepared for many songs; made by :meth:`Matcher.index`.
-
-    Holds the clips in host memory, and their tables in device memory where the matcher's budget allows: see
-    :class:`kernels.matching.catalogue.Catalogue` for what it is made of.
-    """
-
-    @property
-    def device_bytes(self) -> int:
-        """Device memory held between searches."""
-        return sum(chunk.tables.n_bytes for chunk in self.chunks if chunk.tables is not None)
-
-
-class Matcher:
+class Matcher(ChunkedSearch[Tables]):
     """The search on one device.
 
     Parameters
@@ -79,10 +64,8 @@ class Matcher:
         by_level: bool | None = None,
         program: Program | None = None,
     ) -> None:
-        if memory_bytes <= 0:
-            raise ValueError(f"memory_bytes: want > 0, got {memory_bytes}")
+        super().__init__(memory_bytes=memory_bytes)
         self.program = program or Program(context or cl.Context([pick_device()]))
-        self.memory_bytes = memory_bytes
         self.plan = plan
         self.by_level = not self.program.is_cpu if by_level is None else by_level
         self.last_plan: Plan | None = plan
@@ -92,80 +75,8 @@ class Matcher:
         """Device and driver, for metadata."""
         return self.program.name
 
-    def index(self, clips: Iterable[Series], *, scales: Sequence[float] = SCALES) -> ClipIndex:
-        """Prepare a catalogue for many songs.
-
-        Parameters
-        ----------
-        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys
-        scales : rising multiples of 1/50
-
-        Returns
-        -------
-        ClipIndex
-            Its tables are built by the first search and stay on the device if all fit into the memory allowed; else
-            they are built anew, chunk by chunk, by every search.
-
-        Raises
-        ------
-        ValueError
-            If a clip is not (F,), not finite or negative; or the scales are not as wanted.
-        """
-        fiftieths = numerators(scales)
-        chunks = list(self._chunks(clips, fiftieths, n_segments=0))
-        return ClipIndex(chunks, fiftieths=fiftieths, is_resident=len(chunks) <= 1)
-
-    def matches(
-        self,
-        segments: Sequence[Series],
-        clips: Iterable[Series] | ClipIndex,
-        *,
-        k: int,
-        scales: Sequence[float] = SCALES,
-        floors: Sequence[float] | None = None,
-    ) -> list[list[Match]]:
-        """Find the k best clips of every segment.
-
-        Parameters
-        ----------
-        segments : sequence of (L,) float, L >= 1, finite, >= 0
-        clips : iterable of (T,) float, finite, >= 0, in ascending order of their keys; or their index
-            An iterable is read once, a chunk at a time.
-        k : int, >= 1
-        scales : rising multiples of 1/50
-        floors : sequence of S float, or None
-            Scores that k clips elsewhere are known to reach, as when many workers share a song: worse ones may be left
-            out here. What :func:`kernels.matching.score.merge_matches` makes of all parts stays the same.
-
-        Returns
-        -------
-        list, one a segment, of lists of Match
-            As :func:`kernels.matching.score.reference_matches`, to the bit.
-
-        Raises
-        ------
-        ValueError
-            As the reference; or if an index was made for other scales, or there is not one floor a segment.
-        MemoryError
-            If the device cannot hold even one clip and its tables.
-        """
-        fiftieths = numerators(scales)
-        segments = [np.asarray(segment) for segment in segments]
-        given = check_search(segments, clips, k=k, fiftieths=fiftieths, floors=floors)
-        found: list[list[Match]] = [[] for _ in segments]
-        if not segments:
-            return found
-        song = Song(segments, k=k, fiftieths=fiftieths)
-        chunks = (
-            clips.chunks if isinstance(clips, ClipIndex) else self._chunks(clips, fiftieths, n_segments=len(segments))
-        )
+    def _begin(self) -> None:
         self.last_plan = self.plan
-        for chunk in chunks:
-            is_kept = isinstance(clips, ClipIndex) and clips.is_resident
-            reached = [matches[-1].score if len(matches) == k else -1.0 for matches in found]
-            part = self._search(song, chunk, np.maximum(given, reached), is_kept=is_kept)
-            found = merge_matches([found, part], k=k)
-        return found
 
     def _chunks(
         self, clips: Iterable[Series], fiftieths: tuple[int, ...], *, n_segments: int
