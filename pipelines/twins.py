@@ -63,17 +63,17 @@ class Matches:
         """What computes, with its driver."""
         return self._on.name
 
-    def index(self, clips: Sequence[NDArray[Any]]) -> "Catalogue":
+    def index(self, clips: Sequence[NDArray[Any]]) -> "IndexedClips":
         """Prepare a catalogue for many songs.
 
         Parameters
         ----------
         clips : sequence of (T,) float, finite, >= 0, in ascending order of their keys
         """
-        return Catalogue(clips)
+        return IndexedClips(clips)
 
     def matches(
-        self, segments: Sequence[NDArray[Any]], clips: "Catalogue | Sequence[NDArray[Any]]", *, k: int
+        self, segments: Sequence[NDArray[Any]], clips: "IndexedClips | Sequence[NDArray[Any]]", *, k: int
     ) -> Sequence[Sequence[Match]]:
         """Find the k best clips of every segment.
 
@@ -87,12 +87,12 @@ class Matches:
         -------
         one list a segment, the best first
         """
-        if not isinstance(clips, Catalogue):
+        if not isinstance(clips, IndexedClips):
             return self._on.use(lambda engine: engine.matches(segments, clips, k=k))
         return self._on.use(lambda engine: engine.matches(segments, clips.indexed(engine), k=k))
 
 
-class Catalogue:
+class IndexedClips:
     """Clips prepared for many songs on whatever searches them.
 
     Parameters

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kernels.ranks import mean_ranks
 from kernels.types import Float, Int, MotionGraph
-from kernels.warp import EASY_WARP, HARD_WARP
+from kernels.warp import EASY_WARP, HARD_WARP, stretch_price
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def warp_cost(ratio: Float, costs: PathCosts) -> Float:
     stretch = np.log(np.asarray(ratio, np.float64))
     (soft_low, soft_high), (hard_low, hard_high) = np.log(costs.soft_ratio), np.log(costs.hard_ratio)
     excess = np.maximum((stretch - soft_high) / (hard_high - soft_high), (soft_low - stretch) / (soft_low - hard_low))
-    smooth = costs.warp * (stretch / np.log(1.1)) ** 2
+    smooth = costs.warp * stretch_price(np.asarray(ratio, np.float64))
     return np.asarray(smooth + np.where(excess > 0, costs.leaving + costs.warp_outside * excess, 0.0), np.float64)
 
 
