@@ -337,7 +337,7 @@ def _say(text: str, as_json: bool) -> None:
     (TROUBLE if as_json else Console(highlight=False, soft_wrap=True, markup=False, emoji=False)).print(text)
 
 
-def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - a Outcome; typed where it is loaded
+def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - an Outcome; typed where it is loaded
     for line in result.troubles:
         TROUBLE.print(line)
     if as_json:
