@@ -1,4 +1,4 @@
-"""Measure the calibration of suits: speed beside the document's springs, and with --bars the table of accuracies.
+"""Measure the calibration of suits: speed beside springs, and with --bars the table of accuracies.
 
     python benchmarks/calibration.py [--frames N] [--repeats R] [--device NAME] [--bars] [--seeds K] [--json]
 
@@ -6,8 +6,8 @@
 literal 30-iteration springs compiled with numba, one frame after another on one thread, and by the same loop in plain
 Python (timed on some frames). All three in one run; every figure is the median of the repeats after a warm-up, in CPU
 seconds of all threads, wall seconds beside. *Whole*: reading the recording from Parquet, cleaning, calibrating, solving
-poses. *Linear*: ten times the frames. The document's own figure, 519 s for 30 iterations on 8 cores of 2006, is quoted
-beside: a soft peer.
+poses. *Linear*: ten times the frames. The figure of [Kitsunai2007], 519 s for 30 iterations on 8 cores of 2006, is
+quoted beside: a soft peer.
 
 *Bars*: recordings made as told in docs/calibration.md, with seeds that nothing was tuned on.
 """
@@ -80,7 +80,7 @@ def speed(n_frames: int, repeats: int, device: str | None) -> dict[str, float | 
         relax_frame(springs, model.parent, stream.position_xyz_m[k].tolist(), stream.rotation_wxyz[k].tolist())
     python_cpu_s = (time.process_time() - begin) / len(some) * n_frames
 
-    # is the baseline the document's? its gaps, on the recording as received where every sensor was good
+    # is the baseline that of [Kitsunai2007]? its gaps, on the recording as received where every sensor was good
     whole = np.flatnonzero(~cleaned.is_filled.any(axis=1))
     received = Stream(made.recording.position_xyz_m[whole], made.recording.rotation_wxyz[whole], stream.weight[whole])
     spring_gap = {}

@@ -1,4 +1,4 @@
-"""The document's springs compiled, one frame after another on one thread: the baseline of speed."""
+"""The springs of [Kitsunai2007] compiled, one frame after another on one thread: the baseline of speed."""
 
 from __future__ import annotations
 

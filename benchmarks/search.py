@@ -109,7 +109,7 @@ class Methods:
         yield "mean and deviation of the pose", apart(mean_and_deviation(self.window))
         yield "dynamic time warping", warped([self.window[i] for i in np.flatnonzero(held)], motions)
         n_frames = -(-max(len(window) for window in self.window) // 4) * 4
-        for name, is_masked in (("the document's encoder", False), ("the same, masked and pooled", True)):
+        for name, is_masked in (("the encoder of Ganbat 2020", False), ("the same, masked and pooled", True)):
             found = train_document(
                 motions, number, n_frames=n_frames, is_masked=is_masked, seed=self.seed, augmentation=Augmentation()
             )

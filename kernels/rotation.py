@@ -209,7 +209,7 @@ def to_matrix(q: Floats) -> Float:
 
 
 def from_matrix(m: Floats) -> Float:
-    """Read rotation matrices for column vectors (Shepperd's method: the largest component divides).
+    """Read rotation matrices for column vectors (the largest component divides [Shepperd1978]).
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ class MotionGraph:
         Transition edges, sorted by source, then weight, then target. A bidirectional edge is two rows; where missing
         frames or a jump in the recording forbid one direction, there is only the other.
     weight : (E,) float64, >= 0
-        d(i, j) / (d(i) + d(j)), equation 20 of JP5778523B2.
+        d(i, j) / (d(i) + d(j)), equation 20 of [Xu2015].
     accent : (N,) float64, 0 to 1, or None
         How plainly the body stops at each node, :func:`kernels.motion.velocity.accents`; None where it is not known.
     peak_jerk, usual_jerk : (N,) float64, >= 0, metres per second cubed, or None

@@ -13,7 +13,7 @@ _START_FRAME = next(c for c in MUSIC_SEGMENT.columns if c.name == "start_frame_i
 MATCH = Table(
     name="match",
     version=1,
-    meaning="One of the clips whose rhythm is most like that of one segment of a song, by eq. 1 of the document.",
+    meaning="One of the clips whose rhythm is most like that of one segment of a song, by equation 1 of [Yagi2009].",
     key=("song_id", "segment_index", "rank_number"),
     columns=(
         f.SONG_ID,

@@ -1,4 +1,4 @@
-"""Tables of motion search (S4)."""
+"""Tables of motion search."""
 
 from __future__ import annotations
 

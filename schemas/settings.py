@@ -37,7 +37,7 @@ class CalibrationSettings(_Checked):
 
     method: str = key(
         "gauss_newton",
-        "'gauss_newton' (joints closed, two steps) or 'springs' (the document's relaxation, for comparison).",
+        "'gauss_newton' (joints closed, two steps) or 'springs' (the relaxation of [Kitsunai2007], for comparison).",
         values=("gauss_newton", "springs"),
     )
     iterations: int = key(0, "Steps of the method; 0: its usual, 2 of Gauss-Newton, 30 of springs.", least=0, most=1000)
@@ -53,12 +53,12 @@ class CalibrationSettings(_Checked):
 
 @dataclass(frozen=True)
 class MotionBeatSettings(_Checked):
-    """How the beats of a clip are found (JP5778523B2)."""
+    """How the beats of a clip are found [Xu2015]."""
 
-    method: str = key("fft", "'fft', as the document has it, or 'autocorrelation'.", values=("fft", "autocorrelation"))
+    method: str = key("fft", "'fft', as [Xu2015] has it, or 'autocorrelation'.", values=("fft", "autocorrelation"))
     component: int = key(1, "Principal component that carries the beat, from 1.", least=1, most=22)
     frame: str = key(
-        "body", "'body': joints seen from where the dancer faces; 'world': as the document.", values=("body", "world")
+        "body", "'body': joints seen from where the dancer faces; 'world': as [Xu2015].", values=("body", "world")
     )
     joints: tuple[str, ...] = key((), "Canonical joints whose movement counts; empty for all.")
     extrema_per_beat: int = key(0, "1: every turn is a beat; 2: every second; 0: decided by rule.", values=(0, 1, 2))
@@ -85,7 +85,7 @@ class MotionGraphSettings(_Checked):
     mirror: bool = key(False, "Dance clips mirrored, left for right, as well: twice the catalogue.")
     prune: str = key(
         "reach",
-        "'reach' (a dance can go on for ever), 'dead_ends' (the document's), 'component' or 'none'.",
+        "'reach' (a dance can go on for ever), 'dead_ends' ([Xu2015]), 'component' ([Kovar2002]) or 'none'.",
         values=("reach", "dead_ends", "component", "none"),
     )
 
@@ -203,7 +203,7 @@ class ChoreographyModelSettings(_Checked):
     smoothing: float = key(0.0, "Added to every count; 0: chosen on performances held out.", least=0, most=100)
     symbols: str = key(
         "product",
-        "'product': all drums of a motion, each by itself; 'single': the loudest, as the document.",
+        "'product': all drums of a motion, each by itself; 'single': the loudest, as [Kameda2009].",
         values=("product", "single"),
     )
     melody_weight: float = key(0.5, "How much the way the melody goes counts against the drums.", least=0, most=10)
@@ -231,7 +231,7 @@ class DanceSettings(_Checked):
     )
     blend_shape: str = key(
         "slerp",
-        "'slerp' (eased), 'linear_slerp' (the document's) or 'inertial' (springs both ways): docs/seams.md.",
+        "'slerp' (eased), 'linear_slerp' ([Xu2015]) or 'inertial' (springs both ways): docs/seams.md.",
         values=("slerp", "linear_slerp", "inertial"),
     )
     lock_feet: bool = key(True, "Keep feet where they stand: root and legs give way to contacts of the clips.")

@@ -37,9 +37,8 @@ def parse_values(block: bytes, n_frames: int, n_channels: int, *, path: str, fir
     Notes
     -----
     The text is squeezed free of white space, the places where words end become the offsets of an Arrow string array,
-    and Arrow parses that with a correctly rounding algorithm (Lemire, "Number Parsing at a Gigabyte per Second",
-    Software: Practice and Experience, 2021). Anything Arrow does not take is read again word by word, which is slow
-    and knows the line.
+    and Arrow parses that with a correctly rounding algorithm [Lemire2021]. Anything Arrow does not take is read again
+    word by word, which is slow and knows the line.
     """
     values, n_by_line = _parse_fast(block)
     if values is None:

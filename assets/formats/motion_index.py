@@ -1,7 +1,7 @@
 """The search index on disk: rows as Parquet, vectors and tracks as bare float32 that are mapped and never decoded.
 
 ``all.parquet`` names the files beside it in its metadata: ``vectors``, ``tracks`` and, of a large catalogue,
-``approximate``, an HNSW graph (Malkov and Yashunin 2018) as usearch writes it. Files are named by their content: a
+``approximate``, an HNSW graph [Malkov2018] as usearch writes it. Files are named by their content: a
 search going on while the index is renewed reads the old one to its end.
 """
 

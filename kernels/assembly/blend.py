@@ -145,7 +145,7 @@ def assemble(
     (:mod:`kernels.assembly.stance`); over the blend both are played at the same pace and joined by ``shape``.
     The dance starts at the origin, facing +Z.
 
-    After JP5778523B2, equations 21, 22 and 27; centred blends, blended root travel, feet kept at their height through a
+    After [Xu2015], equations 21, 22 and 27; centred blends, blended root travel, feet kept at their height through a
     blend and the smooth clock are ours.
 
     Parameters

@@ -4,7 +4,7 @@ A warp, a blend and the turn at a seam move feet that stood still in the clips. 
 planted here: first the root gives way, then the legs bend (:mod:`kernels.skeleton.grounding`). A foot stays where it
 was put until it is lifted.
 
-Contact locks after Holden's published inertialising controller; offline there is no need for its springs: what comes
+Contact locks after Holden's published controller [Holden2021]; offline there is no need for its springs: what comes
 after a contact is known.
 """
 

@@ -45,7 +45,7 @@ Join = Callable[[Float, float, Side, Side], tuple[Float, Float]]
 
 
 def ease(x: Float) -> Float:
-    """Rise from 0 to 1 with no slope at either end: 3x^2 - 2x^3 on [0, 1] (Kovar et al. 2002).
+    """Rise from 0 to 1 with no slope at either end: 3x^2 - 2x^3 on [0, 1] [Kovar2002].
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def slerp(x: Float, half_s: float, before: Side, after: Side) -> tuple[Float, Fl
 
 
 def linear_slerp(x: Float, half_s: float, before: Side, after: Side) -> tuple[Float, Float]:
-    """Mix both clips with a share that rises evenly: JP5778523B2, equations 21 and 22.
+    """Mix both clips with a share that rises evenly: [Xu2015], equations 21 and 22.
 
     Parameters
     ----------
@@ -95,8 +95,8 @@ def _mix(share: Float, before: Side, after: Side) -> tuple[Float, Float]:
 def inertial(x: Float, half_s: float, before: Side, after: Side) -> tuple[Float, Float]:
     """Play one clip up to the seam and the other after it, each with half their offset there, which springs decay.
 
-    Inertialisation (Bollo, GDC 2018; springs after Holden) both ways from the seam, so that the pose of the beat stays
-    on the beat: pose and speed are continuous, neither clip is seen beyond the seam.
+    Inertialisation ([Bollo2018]; springs after [Holden2021]) both ways from the seam, so that the pose of the beat
+    stays on the beat: pose and speed are continuous, neither clip is seen beyond the seam.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ class Measure:
 
 
 def f_measure(found_s: Float, wanted_s: Float, *, tolerance_s: float = 0.07) -> float:
-    """Share of beats met, both ways, one to one.
+    """Share of beats met, both ways, one to one: the F-measure of [Davies2009], as mir_eval computes it.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def f_measure(found_s: Float, wanted_s: Float, *, tolerance_s: float = 0.07) -> 
 def beat_alignment(motion_s: Float, music_s: Float, *, sigma_s: float = 0.05) -> float:
     """Beat alignment score: how near the closest motion beat is to each music beat.
 
-    Mean of exp(-d^2 / 2 sigma^2) over music beats (Siyao et al., "Bailando", CVPR 2022), in seconds. Chance level for
-    regular beats half a second apart is 0.25.
+    Mean of exp(-d^2 / 2 sigma^2) over music beats [Siyao2022], in seconds. Chance level for regular beats half a second
+    apart is 0.25.
 
     Parameters
     ----------

@@ -74,8 +74,8 @@ def meet(before_xyz_m: Float, after_xyz_m: Float, planted: Float, *, heading_rad
 
     Notes
     -----
-    Closed form of Kovar, Gleicher and Pighin, "Motion Graphs" (SIGGRAPH 2002), over the planted points, each foot by
-    its share of the body's weight, and a faint memory of root and heading. Nothing is planted: nothing moves.
+    Closed form of [Kovar2002] over the planted points, each foot by its share of the body's weight, and a faint memory
+    of root and heading. Nothing is planted: nothing moves.
     """
     sides = [np.stack([p[grounding.ANKLES], p[grounding.TOES]]) for p in (before_xyz_m, after_xyz_m)]
     bears = np.mean([_bearing(p, feet[0]) for p, feet in zip((before_xyz_m, after_xyz_m), sides, strict=True)], axis=0)

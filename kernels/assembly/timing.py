@@ -71,7 +71,7 @@ class Clock:
     def at(self, time_s: Float) -> Float:
         """Seconds of motion danced up to a song time, (n,); linear beyond the ends.
 
-        A monotone cubic through the boundaries (Fritsch and Carlson, 1980), so that speed does not jump at a beat.
+        A monotone cubic through the boundaries [Fritsch1980], so that speed does not jump at a beat.
 
         Parameters
         ----------

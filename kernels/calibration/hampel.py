@@ -1,4 +1,4 @@
-"""Entries that stand out from the frames around them: Hampel's rule about a running median of nine.
+"""Entries that stand out from the frames around them: Hampel's rule [Hampel1974] about a running median of nine.
 
 Conventions
 -----------
@@ -18,7 +18,7 @@ from kernels.types import Float
 _LEAST_M, _LEAST_QUATERNION = 0.015, 0.05
 _TURN_M_PER_S2, _TURN_RAD_PER_S2 = 30.0, 100.0
 _MOST_BAD = 5
-# Exchanges of a network after which the fifth of nine is their median (Devillard, 1998).
+# Exchanges of a network after which the fifth of nine is their median [Devillard1998].
 _NETWORK = "12 45 78 01 34 67 12 45 78 03 58 47 36 14 25 47 42 64 42"  # pairs of places, smaller to the first
 
 

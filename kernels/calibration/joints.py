@@ -1,4 +1,4 @@
-"""Where the joint between two sensors is: the closed form of O'Brien's least squares, made robust and unbiased.
+"""Where the joint between two sensors is: the least squares of [OBrien2000] in closed form, made robust and unbiased.
 
 Conventions
 -----------
@@ -8,9 +8,7 @@ decomposition ``U diag(m) V^T``; 1 - m_k tells how well direction k of the joint
 
 References
 ----------
-J. O'Brien, B. Bodenheimer, G. Brostow, J. Hodgins, "Automatic joint parameter estimation from magnetic motion capture
-data", Graphics Interface 2000; R. Ehrig et al., "A survey of formal methods for determining the centre of rotation of
-ball joints", J. Biomechanics 2006 (SCoRE: the same equations).
+[OBrien2000]; [Ehrig2006] (SCoRE: the same equations).
 """
 
 from __future__ import annotations
@@ -88,11 +86,11 @@ def solve_pair(
 
     Notes
     -----
-    Rounds of Tukey's weights around the closed form. Orientation noise shortens the mean of R_i^T R_j, not the identity
-    blocks (errors in variables): M and the right sides are lengthened again. Directions seen less than :data:`UNSEEN`
-    leave the sum of the two places undetermined, and it is set to nothing: the joint lies midway between the feet of
-    the two sensors on that axis. What residual neither noise explains is soft tissue, and shrinks weakly seen
-    directions.
+    Rounds of Tukey's weights [Beaton1974] around the closed form. Orientation noise shortens the mean of R_i^T R_j, not
+    the identity blocks (errors in variables): M and the right sides are lengthened again. Directions seen less than
+    :data:`UNSEEN` leave the sum of the two places undetermined, and it is set to nothing: the joint lies midway between
+    the feet of the two sensors on that axis. What residual neither noise explains is soft tissue, and shrinks weakly
+    seen directions.
     """
     weight = is_good.astype(np.float64)
     solution = closed_form(parent, child, weight, rotation_noise_rad=rotation_noise_rad)

@@ -49,13 +49,11 @@ def pair_costs(rotation_matrix: Float, position_xyz_m: Float) -> Float:
 
     Notes
     -----
-    The best tree joins the pairs that leave the least open (C. K. Chow, C. N. Liu, "Approximating discrete probability
-    distributions with dependence trees", IEEE Transactions on Information Theory 1968): what is open of a normal
-    variable is half the logarithm of the determinant of its covariance. Open are where the joint's two ends lie apart,
-    with Tukey's weights, and how the two sensors turn against each other. Residuals alone take two collar bones for
-    neighbours, 5 cm apart and hardly turning, as soon as tissue slides by 5 mm; but each turns less against the
-    thorax than against the other. Turning counts twice: tissue that slides by millimetres turns a sensor by few
-    degrees.
+    The best tree joins the pairs that leave the least open [Chow1968]: what is open of a normal variable is half the
+    logarithm of the determinant of its covariance. Open are where the joint's two ends lie apart, with Tukey's weights
+    [Beaton1974], and how the two sensors turn against each other. Residuals alone take two collar bones for neighbours,
+    5 cm apart and hardly turning, as soon as tissue slides by 5 mm; but each turns less against the thorax than against
+    the other. Turning counts twice: tissue that slides by millimetres turns a sensor by few degrees.
     """
     residual, c_i, c_j, spread = _all_pairs(rotation_matrix, position_xyz_m)
     s = len(residual)
@@ -111,7 +109,7 @@ def _all_pairs(rotation_matrix: Float, position_xyz_m: Float) -> tuple[Float, Fl
 
 
 def spanning_tree(cost: Float) -> list[tuple[int, int]]:
-    """Join all sensors by the pairs of least cost (Prim), as O'Brien finds a body's tree.
+    """Join all sensors by the pairs of least cost [Prim1957], as a body's tree is found in [OBrien2000].
 
     Parameters
     ----------

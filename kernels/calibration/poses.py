@@ -30,7 +30,7 @@ def solve_poses(
     cleaned : Cleaned of F frames
     calibration : Calibration
     method : "gauss_newton" or "springs"
-        The first closes every joint by construction; the second is the document's spring relaxation.
+        The first closes every joint by construction; the second is the spring relaxation of [Kitsunai2007].
     iterations : int, >= 1, or None for the method's usual: 2 and 30
     device : PoseSolver or None
         A twin from ``kernels.opencl`` that was made for the same method; None for the NumPy reference.

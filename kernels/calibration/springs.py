@@ -1,7 +1,6 @@
-"""The document's way to close the gaps: springs between bones, relaxed step by step.
+"""Springs between bones that close the gaps, relaxed step by step: the method of [Kitsunai2007], after Kondo et al.
 
-After Kitsunai, Saito and Nakajima, "Boosting of the spring based automatic body calibration algorithm" (after Kondo et
-al.): springs join the ends of adjacent bones and hold each bone to its sensor; forces give accelerations, accelerations
+Springs join the ends of adjacent bones and hold each bone to its sensor; forces give accelerations, accelerations
 positions; all accelerations of an iteration are computed before any bone moves. Kept as a reference and as an option:
 it oscillates at few iterations and never quite closes; :mod:`kernels.calibration.tree_solver` does both better.
 
@@ -146,7 +145,7 @@ def relax_frame(
     *,
     iterations: int = 30,
 ) -> tuple[list[list[float]], list[list[float]]]:
-    """Let the springs pull on one frame, bone by bone, in plain Python: the document's loop, read aloud.
+    """Let the springs pull on one frame, bone by bone, in plain Python: the loop of [Kitsunai2007].
 
     Parameters
     ----------

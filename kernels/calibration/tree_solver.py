@@ -173,7 +173,7 @@ def body_rows(model: BodyModel) -> Float:
     (S, 11) float64
         Sensor in its bone's frame (3), proximal joint in the parent's (3), both in metres; one over the variance of
         positions and of rotations, in units of 5 mm; what damps a turn; what squared residuals, of positions in metres
-        and of rotations in radians, are multiplied with for the weight after Geman and McClure.
+        and of rotations in radians, are multiplied with for the weight of Geman and McClure [Geman1987].
     """
     apart, turned = _UNIT_M / model.position_sigma_m, _UNIT_M / model.rotation_sigma_rad
     per_variance = np.stack([apart * apart, turned * turned], axis=1)

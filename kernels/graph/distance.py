@@ -1,4 +1,4 @@
-"""How far one pose is from another: equations 17 and 18 of JP5778523B2, and what stands for them on a device.
+"""How far one pose is from another: equations 17 and 18 of [Xu2015], and what stands for them on a device.
 
 Conventions
 -----------
@@ -157,7 +157,7 @@ def pose_distance(rows: PoseFeatures, columns: PoseFeatures) -> Float:
 
     Notes
     -----
-    Equations 17 and 18 of JP5778523B2, with the velocities it allows in the sum. Terms are added one after another in
+    Equations 17 and 18 of [Xu2015], with the velocities it allows in the sum. Terms are added one after another in
     a fixed order by element-wise operations: no matrix product, whose last bits would change with shapes and threads.
     """
     check_pair(rows, columns)

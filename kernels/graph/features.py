@@ -48,8 +48,7 @@ def default_weight(metric: Metric) -> Float:
     Large for hips, legs, spine and arms, small for what a viewer hardly sees at a seam. For "position" the weight
     belongs to the joint's place (knees, ankles, elbows, wrists 1; hips 1; chest, head, shoulders, hip joints 0.5; toes
     0.1); for "rotation" to its local rotation (hips, thighs, knees, shoulders, spine 1; elbows 0.5; neck, ankles,
-    collar bones 0.1; hands, toes, head 0), after the choice of Lee, Chai, Reitsma, Hodgins and Pollard, "Interactive
-    Control of Avatars Animated with Human Motion Data" (SIGGRAPH 2002), who give the extremities none.
+    collar bones 0.1; hands, toes, head 0), after the choice of [Lee2002], who give the extremities none.
 
     Raises
     ------

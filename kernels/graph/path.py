@@ -1,7 +1,7 @@
 """The best way through the motion graph for one song: a dynamic program over its beats.
 
-After the search of JP5778523B2 (equations 23 to 26), with every start as a source of one program instead of one program
-a start, transitions that take no time, and costs for warp, half- and double-time, and repetition.
+After the search of [Xu2015] (equations 23 to 26), with every start as a source of one program instead of one program a
+start, transitions that take no time, and costs for warp, half- and double-time, and repetition.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A pin admits some nodes in some music intervals; :func:`kernels.graph.path.find_
 Whether pins can be kept asks for no prices, only for reachability, so a whole song is answered in milliseconds and
 sets of pins can be tried one after the other.
 
-JP5778523B2 gives labelled beats a soft attribute value instead (equations 23 to 26): a dance may ignore it when a seam
+[Xu2015] gives labelled beats a soft attribute value instead (equations 23 to 26): a dance may ignore it when a seam
 costs more.
 """
 
@@ -266,9 +266,8 @@ def find_conflict(
     A set that cannot be kept cannot be kept with more in it. So every conflict has one of the pins that a largest set
     which *can* be kept leaves out: the smallest conflict is a smallest set that hits all of what such sets leave out.
     Those are found one by one: the smallest set that hits all that is known either conflicts and is the answer, or
-    grows to another set that can be kept. (Ignatiev, Previti, Liffiton and Marques-Silva, "Smallest MUS extraction with
-    minimal hitting set dualization", CP 2015.) Trying all sets by size instead would take years for twenty pins that
-    only together conflict.
+    grows to another set that can be kept [Ignatiev2015]. Trying all sets by size instead would take years for twenty
+    pins that only together conflict.
     """
     if reach.keeps(pins):
         return None

@@ -16,7 +16,7 @@ Mask = NDArray[np.bool_]
 
 
 def pose_ratio(wanted: BeatFeatures, shown: BeatFeatures) -> Float:
-    """Distance of poses as the graph weighs seams: d(i, j) / (d(i) + d(j)), equation 20 of JP5778523B2.
+    """Distance of poses as the graph weighs seams: d(i, j) / (d(i) + d(j)), equation 20 of [Xu2015].
 
     Parameters
     ----------

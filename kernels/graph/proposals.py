@@ -1,6 +1,6 @@
 """What could be danced at a moment of a song, and what it would cost: the candidates shown to a director.
 
-After the candidate presentation unit of JP5778523B2. A forward and a backward pass of the dynamic program
+After the candidate presentation unit of [Xu2015]. A forward and a backward pass of the dynamic program
 (:mod:`kernels.graph.program`) meet in every step that covers the moment: their sum is the exact price of the cheapest
 dance that takes the step there.
 """

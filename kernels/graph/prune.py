@@ -56,7 +56,7 @@ def keep_all(graph: MotionGraph) -> Pruned:
 
 
 def remove_dead_ends(graph: MotionGraph) -> Pruned:
-    """Remove nodes of degree one, again and again, until none is left: the pruning of JP5778523B2.
+    """Remove nodes of degree one, again and again, until none is left: the pruning of [Xu2015].
 
     Parameters
     ----------
@@ -90,9 +90,8 @@ def remove_dead_ends(graph: MotionGraph) -> Pruned:
 def keep_strongest(graph: MotionGraph) -> Pruned:
     """Keep the largest strongly connected component: from every node kept every other can be danced to.
 
-    The pruning of Kovar, Gleicher and Pighin, "Motion Graphs" (SIGGRAPH 2002), on steps instead of bare edges (module
-    docstring). Of components equally large, the one with the first node. Nothing is kept when no dance can come back
-    to where it was.
+    The pruning of Kovar, Gleicher and Pighin [Kovar2002], on steps instead of bare edges (module docstring). Of
+    components equally large, the one with the first node. Nothing is kept when no dance can come back to where it was.
 
     Parameters
     ----------

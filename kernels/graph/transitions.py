@@ -226,7 +226,7 @@ def nearest(
 
 
 def connect(nodes: BeatNodes, pairs: Nearest, *, threshold: float | None = None) -> Transitions:
-    """Join the listed pairs whose weight is below the threshold: equations 19 and 20 of JP5778523B2.
+    """Join the listed pairs whose weight is below the threshold: equations 19 and 20 of [Xu2015].
 
     Parameters
     ----------

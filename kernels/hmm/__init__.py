@@ -1,1 +1,1 @@
-"""What the dancer would do: basic motions as states, the music as what they emit (S5)."""
+"""What the dancer would do: basic motions as states, the music as what they emit [Kameda2009]."""

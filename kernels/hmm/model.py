@@ -1,7 +1,7 @@
 """The model by counting: which motion comes first, which follows which, what sounds while it is danced.
 
-After Kameda, Watanabe and Yamamoto: states are seen in training, so nothing has to be estimated by iteration. Unseen
-events get a share by add-alpha smoothing, alpha chosen on performances held out.
+After [Kameda2009]: states are seen in training, so nothing has to be estimated by iteration. Unseen events get a share
+by add-alpha smoothing, alpha chosen on performances held out.
 
 Conventions
 -----------

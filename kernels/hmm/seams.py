@@ -90,7 +90,7 @@ def limb_paths(position_xyz_m: Float, root_wxyz: Float, *, frame_rate_hz: float,
     """Follow hands and feet around moments of a clip, seen from where the hips stand and face at the moment.
 
     Not only where they are but where they go: a hand that comes from the left does not go on into one that comes from
-    the right, however near they meet. After the windows of Kovar, Gleicher and Pighin, "Motion Graphs" (2002).
+    the right, however near they meet. After the windows of [Kovar2002].
 
     Parameters
     ----------

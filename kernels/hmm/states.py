@@ -1,6 +1,6 @@
 """Basic motions: clusters of motions by their three key poses, the states of the model.
 
-After Kameda, Watanabe and Yamamoto, who cluster by k-means; how many clusters, and where they start, is ours.
+After [Kameda2009], who cluster by k-means; how many clusters, and where they start, is ours.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _principal(vectors: Float) -> Float:
 
 
 def k_means(points: Float, k: int, *, seed: int = 0) -> Int:
-    """Cluster points by Lloyd's algorithm from several k-means++ starts.
+    """Cluster points by Lloyd's algorithm [Lloyd1982] from several k-means++ starts [Arthur2007].
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def k_means(points: Float, k: int, *, seed: int = 0) -> Int:
 
 
 def _plus_plus(points: Float, k: int, rng: np.random.Generator) -> Float:
-    """Spread k first centres by the squared distance from those before (Arthur and Vassilvitskii, 2007)."""
+    """Spread k first centres by the squared distance from those before [Arthur2007]."""
     chosen = [int(rng.integers(len(points)))]
     apart = ((points - points[chosen[0]]) ** 2).sum(axis=1)
     while len(chosen) < k:
@@ -192,7 +192,7 @@ def clearness(points: Float, label: Int, k: int) -> float:
     Returns
     -------
     float, -1 to 1
-        a is a point's distance from its own centroid, b from the nearest other one (Hruschka et al., 2004); 0 for a
+        a is a point's distance from its own centroid, b from the nearest other one [Hruschka2004]; 0 for a
         single cluster.
     """
     if k < 2:

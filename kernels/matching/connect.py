@@ -1,8 +1,8 @@
 """Which candidate may follow which: link directions and their velocities at the joint.
 
-After Shiratori, Nakazawa and Ikeuchi: two pieces of motion connect where the directions of the body's links and how
-they change are alike at the seam. Their thresholds are not in the copies we have; ours are measured inside the clips:
-what a body does on its own while a blend lasts is no seam.
+After [Shiratori2006]: two pieces of motion connect where the directions of the body's links and how they change are
+alike at the seam. Their thresholds are not in the copies we have; ours are measured inside the clips: what a body does
+on its own while a blend lasts is no seam.
 
 Conventions
 -----------

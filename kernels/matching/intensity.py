@@ -1,8 +1,8 @@
 """Whether a piece of motion rises and falls with the music: histograms of intensity, and its order in time.
 
-Shiratori, Nakazawa and Ikeuchi choose among matches by the Bhattacharyya coefficient of the histograms of motion and
-music intensity. A histogram cannot tell a crescendo from a decrescendo, so the rank correlation of the two curves, beat
-by beat, stands beside it (ours).
+In [Shiratori2006] matches are chosen by the Bhattacharyya coefficient of the histograms of motion and music intensity.
+A histogram cannot tell a crescendo from a decrescendo, so the rank correlation of the two curves, beat by beat, stands
+beside it (ours).
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ def histogram(values: Float, edges: Float) -> Float:
 
 def bhattacharyya(p: Float, q: Float) -> float:
     """Bhattacharyya coefficient of two histograms: sum of sqrt(p q); 1 where they are equal, 0 where disjoint.
+
+    [Bhattacharyya1943].
 
     Parameters
     ----------

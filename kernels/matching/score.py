@@ -84,7 +84,7 @@ def start_count(n_segment: int, n_clip: int, numerator: int) -> int:
 def sums(
     segment: NDArray[np.floating], clip: NDArray[np.floating], *, numerator: int, starts: NDArray[np.integer]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Score candidates of one clip at one scale: eq. 1 of the document, in float64, from the first frame to the last.
+    """Score candidates of one clip at one scale: equation 1 of [Yagi2009], in float64, from first frame to last.
 
     Parameters
     ----------

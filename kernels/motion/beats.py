@@ -1,6 +1,6 @@
 """Motion beats: where a dancer's largest movement turns, as an even grid.
 
-The method of JP5778523B2 (Xu, Takagi, Sakazawa, KDDI), equations 3 to 16: principal components in short windows, joined
+The method of [Xu2015], equations 3 to 16: principal components in short windows, joined
 into one curve, whose extrema are beats. Equations 11 and 13 are images in every copy read; they are rebuilt from the
 text around them. Ours, and marked so below: smoothing and a prominence before extrema are taken, the least-squares
 refinement of the grid, the confidence, and the choice of octave.
@@ -30,7 +30,7 @@ class BeatSettings:
         Principal component that carries the beat; 2 when, say, the body's turn is the largest movement.
     joints : joint indices, or empty for all
         The subset whose movement counts, for example the feet.
-    method : "fft" (the document's) or "autocorrelation" (its alternative)
+    method : "fft" or "autocorrelation" (in [Xu2015] the first, and the alternative it names)
     extrema_per_beat : 1, 2 or 0
         Whether every extremum is a beat, or every second one; 0 decides by rule (see :func:`motion_beats`).
     window_s : float, seconds
@@ -331,7 +331,7 @@ def motion_beats(
 ) -> MotionBeats:
     """Find the beats of a clip.
 
-    After JP5778523B2, "motion beats", equations 3 to 16; see the module docstring for what is ours.
+    After [Xu2015], "motion beats", equations 3 to 16; see the module docstring for what is ours.
 
     Parameters
     ----------
@@ -339,8 +339,8 @@ def motion_beats(
     frame_rate_hz : float, > 0
     heading_rad : (F,) float, radians, or None
         Where the body faces (:func:`kernels.rotation.heading_rad`). Where it is given, the joints are looked at from
-        the body: a dancer who turns is then not taken for one whose every joint swings (ours). None is the document's
-        way, joints relative to the root in the world's axes.
+        the body: a dancer who turns is then not taken for one whose every joint swings (ours). None is the way of
+        [Xu2015], joints relative to the root in the world's axes.
     settings : BeatSettings, or None for the defaults
 
     Returns

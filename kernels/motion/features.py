@@ -1,8 +1,8 @@
 """What a clip does at 120 values a second: weight effort, its stops (rhythm) and its drive (intensity).
 
-After Shiratori, Nakazawa and Ikeuchi, "Dancing-to-music character animation" (Computer Graphics Forum 25(3), 2006),
-whose features the matching of Yagi and Yanagihara (KDDI, GPGPU matching) compares with those of music. The formula of
-weight effort is theirs; saliency weights, thresholds and widths are not in the copies we have and are ours.
+After Shiratori, Nakazawa and Ikeuchi [Shiratori2006], whose features the matching of [Yagi2009] compares with those of
+music. The formula of weight effort is theirs; saliency weights, thresholds and widths are not in the copies we have and
+are ours.
 
 Conventions
 -----------

@@ -1,8 +1,7 @@
 """Where one motion ends and the next begins: intervals between brakings of the body, with three key poses each.
 
-After Kameda, Watanabe and Yamamoto, "Music Driven Computer Animation Based On HMM": the angular acceleration of 16 body
-parts, its extrema, and an interval minimum - maximum - minimum as one motion. The document does not say how the parts
-are combined nor how the derivative is taken; both are ours.
+After [Kameda2009]: the angular acceleration of 16 body parts, its extrema, and an interval minimum - maximum - minimum
+as one motion. They do not say how the parts are combined nor how the derivative is taken; both are ours.
 
 Conventions
 -----------

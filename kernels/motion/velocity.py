@@ -41,8 +41,8 @@ def mean_speed(position_m: Float, frame_rate_hz: float, *, smoothing_s: float = 
 def kinematic_beats(position_m: Float, frame_rate_hz: float, *, smoothing_s: float = 0.0833) -> Int:
     """Find the frames where mean joint speed is at a local minimum.
 
-    After the kinematic beats of Li, Yang, Ross and Kanazawa, "AI Choreographer" (ICCV 2021), with the smoothing of
-    Siyao et al., "Bailando" (CVPR 2022). Used to judge dances only: it knows nothing of motion beats.
+    After the kinematic beats of AI Choreographer [Li2021], with the smoothing of Bailando [Siyao2022]. Used to judge
+    dances only: it knows nothing of motion beats.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def accents(
 def jerk(position_m: Float, frame_rate_hz: float) -> Float:
     """Third difference of every joint's position, largest joint of each frame.
 
-    After Barquero, Escalera and Palmero, "FlowMDM" (CVPR 2024), in SI units so that the frame rate does not count.
+    After FlowMDM [Barquero2024], in SI units so that the frame rate does not count.
 
     Parameters
     ----------

@@ -1,8 +1,7 @@
 """What a song does at 120 values a second: onsets gathered at its beats (rhythm) and its level (intensity).
 
-After Shiratori, Nakazawa and Ikeuchi, "Dancing-to-music character animation" (Computer Graphics Forum 25(3), 2006), who
-take onset strength at beats after Goto (2001) for rhythm. Onsets by :mod:`kernels.music.onsets`; A-weighted level in
-place of the melody range's power is ours.
+After Shiratori, Nakazawa and Ikeuchi [Shiratori2006], who take onset strength at beats [Goto2001] for rhythm. Onsets by
+:mod:`kernels.music.onsets`; A-weighted level in place of the melody range's power is ours.
 """
 
 from __future__ import annotations

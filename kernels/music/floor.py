@@ -13,7 +13,7 @@ ANALYSIS_RATE_HZ = 22050
 
 
 def librosa_beats(samples: Samples, sample_rate_hz: float) -> Float:
-    """Find beats as librosa does: the dynamic program of Ellis, "Beat tracking by dynamic programming" (JNMR 2007).
+    """Find beats as librosa does: the dynamic program of Ellis [Ellis2007].
 
     Parameters
     ----------

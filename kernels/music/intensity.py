@@ -13,7 +13,7 @@ FLOOR_DB = -100.0
 
 
 def a_weighting_db(frequency_hz: Float) -> Float:
-    """Weight of a frequency for the ear, IEC 61672-1, curve A.
+    """Weight of a frequency for the ear, IEC 61672-1, curve A [IEC2013].
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ def to_mono(samples: Samples) -> NDArray[np.float32]:
 
 
 def band_edges_hz(n_bands: int, lowest_hz: float, highest_hz: float) -> Float:
-    """Corner frequencies of triangular bands, equally wide on the mel scale of O'Shaughnessy.
+    """Corner frequencies of triangular bands, equally wide on the mel scale [OShaughnessy1987].
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def band_levels(samples: Samples, sample_rate_hz: float) -> tuple[Float, Float]:
 def flux(level: Float) -> Float:
     """Rise of each band over two frames against the largest of three neighbouring bands.
 
-    After the SuperFlux of Böck and Widmer, "Maximum filter vibrato suppression for onset detection" (DAFx 2013).
+    After the SuperFlux of Böck and Widmer [Bock2013].
 
     Parameters
     ----------

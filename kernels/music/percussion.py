@@ -1,7 +1,7 @@
 """What is heard of a song beside its beats: drums as General MIDI names them, bands of onsets, the way a melody goes.
 
-After Kameda, Watanabe and Yamamoto: the 47 percussion sounds of General MIDI are the symbols that a model of dancing
-emits. Audio has no such names: its onsets are told apart by band, and a band stands for the drums that sound in it.
+After [Kameda2009]: the 47 percussion sounds of General MIDI [MMA1991] are the symbols that a model of dancing emits.
+Audio has no such names: its onsets are told apart by band, and a band stands for the drums that sound in it.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ def heard_in(time_s: Float, symbol: Int, edge_s: Float, n_symbols: int, *, ahead
 
 
 def loudest_in(hits: Hits, edge_s: Float, *, ahead_s: float = 0.0) -> Float:
-    """Keep one symbol an interval, as the document has it: the loudest, of equals the lowest key.
+    """Keep one symbol an interval, as [Kameda2009] has it: the loudest, of equals the lowest key.
 
     Parameters
     ----------

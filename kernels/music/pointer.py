@@ -81,12 +81,11 @@ def best_beats(probability: Float, interval: Int, *, frame_rate_hz: float) -> tu
 
     Notes
     -----
-    The model of Krebs, Böck and Widmer, "An efficient state-space model for joint tempo and meter tracking" (ISMIR
-    2015), for bars of one beat: a pointer runs through each beat interval, the first sixteenth of it is the beat, and
-    the interval may change only at a beat, with probability proportional to exp(-100 |ratio - 1|). Between beats the
-    pointer has no choice, so the same best path is found by a dynamic program over whole intervals, each scored by
-    differences of running sums: K² steps a frame instead of one a state. Two differences: a bonus for usual tempi, and
-    the stretch before the first beat may be any part of an interval.
+    The model of Krebs, Böck and Widmer [Krebs2015], for bars of one beat: a pointer runs through each beat interval,
+    the first sixteenth of it is the beat, and the interval may change only at a beat, with probability proportional to
+    exp(-100 |ratio - 1|). Between beats the pointer has no choice, so the same best path is found by a dynamic program
+    over whole intervals, each scored by differences of running sums: K² steps a frame instead of one a state. Two
+    differences: a bonus for usual tempi, and the stretch before the first beat may be any part of an interval.
     """
     if probability.ndim != 1 or not ((probability >= 0) & (probability <= 1)).all():
         raise ValueError(f"probability: want (F,) from 0 to 1, got {probability.shape}")

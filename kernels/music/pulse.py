@@ -2,10 +2,10 @@
 
 Conventions
 -----------
-A temporal convolutional network after Davies and Böck, "Temporal convolutional networks for musical audio beat
-tracking" (EUSIPCO 2019), made small: 16 hand-made curves in, dilated convolutions of 5 taps over up to 20 seconds
-either way, two probabilities out. Its weights come from songs made up by :mod:`kernels.synthetic.arrangement`; no
-recording and no one else's music went into them. ``benchmarks/train_pulse.py`` makes them anew.
+A temporal convolutional network after Davies and Böck [Davies2019], made small: 16 hand-made curves in, dilated
+convolutions of 5 taps over up to 20 seconds either way, two probabilities out. Its weights come from songs made up by
+:mod:`kernels.synthetic.arrangement`; no recording and no one else's music went into them. ``benchmarks/train_pulse.py``
+makes them anew.
 """
 
 from __future__ import annotations

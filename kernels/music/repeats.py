@@ -1,7 +1,7 @@
 """Where a song comes back to what it played before: a chorus again, a verse again.
 
-Stripes of likeness along the diagonals of the song's self-similarity (after Foote, "Visualizing music and audio using
-self-similarity", ACM Multimedia 1999), on beats, the longest and clearest first.
+Stripes of likeness along the diagonals of the song's self-similarity [Foote1999], on beats, the longest and clearest
+first.
 """
 
 from __future__ import annotations

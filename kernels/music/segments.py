@@ -1,8 +1,7 @@
 """Where a song's phrases begin: spans of a few beats, each danced with one piece of one clip.
 
-Boundaries are looked for where the music before differs from the music after (Foote, "Automatic audio segmentation
-using a measure of audio novelty", ICME 2000), on beats, best on the first of a bar; between them a song is cut every 4
-or 8 beats. One dynamic program weighs both.
+Boundaries are looked for where the music before differs from the music after [Foote2000], on beats, best on the first
+of a bar; between them a song is cut every 4 or 8 beats. One dynamic program weighs both.
 """
 
 from __future__ import annotations

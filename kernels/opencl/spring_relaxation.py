@@ -1,4 +1,4 @@
-"""The document's springs on an OpenCL device: the twin of :func:`kernels.calibration.springs.relax_springs`."""
+"""The springs of [Kitsunai2007] on an OpenCL device: the twin of :func:`kernels.calibration.springs.relax_springs`."""
 
 from __future__ import annotations
 

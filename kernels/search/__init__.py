@@ -1,1 +1,1 @@
-"""Clips like this one (S4): normalisation, encoders and their training, nearest windows."""
+"""Clips like this one: normalisation, encoders and their training, nearest windows."""

@@ -59,7 +59,7 @@ def principal(value: Float, n_out: int) -> Projection:
 
 
 def discriminant(value: Float, label: Int, n_out: int) -> Projection:
-    """Fit the directions that tell labels apart: Fisher's discriminant with a shrunken within-label covariance.
+    """Fit the directions that tell labels apart: Fisher's discriminant [Fisher1936], covariance within labels shrunken.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The document's encoder, kept to be compared with: frames x joints as an image, padded in front, trained to classify.
+"""The encoder of [Ganbat2020], for comparison: frames x joints as an image, padded in front, trained to classify.
 
-KLab's article gives the shape of the input, four convolutions each with batch norm and rectifier, a dense layer to 512
-and training on class labels; kernel sizes, widths and strides are ours.
+The article gives the shape of the input, four convolutions each with batch norm and rectifier, a dense layer to 512 and
+training on class labels; kernel sizes, widths and strides are ours.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def pad(
     n_frames : int
         Longer ones lose their end.
     is_masked : bool
-        False: copies of the first frame in front, as the document. True: zeros behind, and a mask that says so.
+        False: copies of the first frame in front, as [Ganbat2020]. True: zeros behind, and a mask that says so.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def train_document(
     augmentation: Augmentation | None = None,
     progress: Callable[[], None] | None = None,
 ) -> TrainedDocument:
-    """Train the document's encoder as a classifier.
+    """Train the encoder of [Ganbat2020] as a classifier.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def train_document(
     label : (N,) int
     n_frames : int, length all are brought to
     is_masked : bool
-        Mask instead of the document's padding, and mean over time instead of every place in time for itself.
+        Mask instead of padding by the first frame, and mean over time instead of every place in time for itself.
     steps, rows : batches, and motions in each, drawn evenly over labels
     seed : of weights and of what is drawn
     augmentation : how motions are varied; None leaves them as they are

@@ -143,7 +143,7 @@ def _hit(vector: Vectors, query: Vectors, clip: int, a: int, b: int, coarse: Vec
 def steer(query: Vectors, like: Vectors, unlike: Vectors) -> Vectors:
     """Move a query towards motions that are liked and away from those that are not.
 
-    Rocchio, "Relevance feedback in information retrieval" (1971).
+    Relevance feedback as Rocchio has it [Rocchio1971].
 
     Parameters
     ----------

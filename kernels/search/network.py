@@ -31,7 +31,7 @@ def weight_shapes() -> dict[str, tuple[int, ...]]:
 
 
 def initial_weights(rng: np.random.Generator) -> dict[str, NDArray[np.float32]]:
-    """Draw weights to start from (He et al. 2015 for the layers with a rectifier)."""
+    """Draw weights to start from ([He2015] for the layers with a rectifier)."""
     weights = {}
     for name, shape in weight_shapes().items():
         if name.startswith("matrix"):

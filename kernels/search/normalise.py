@@ -1,8 +1,7 @@
 """Motions made comparable: where they start, where they face and how tall the performer is taken away.
 
-After Sedmidubsky, Elias and Zezula, "Effective and efficient similarity searching in motion capture data" (2018). Their
-published normaliser turns the hip line by ``atan`` and leaves a body that faces sideways or backwards as it is; here it
-is ``atan2``.
+After Sedmidubsky, Elias and Zezula [Sedmidubsky2018]. Their published normaliser turns the hip line by ``atan`` and
+leaves a body that faces sideways or backwards as it is; here it is ``atan2``.
 """
 
 from __future__ import annotations
@@ -97,7 +96,7 @@ def normalise(position_xyz_m: Float, *, per_frame: bool = False, is_sized: bool 
         False: the first frame's root goes over the origin and its hips face +Z, so that the path stays. True: every
         frame's do, for searches that ignore travel.
     is_sized : bool
-        Scale to legs of :data:`~kernels.skeleton.canonical.LEG_LENGTH_M`; False leaves sizes alone, as the document.
+        Scale to legs of :data:`~kernels.skeleton.canonical.LEG_LENGTH_M`; False leaves sizes alone, as [Ganbat2020].
 
     Returns
     -------

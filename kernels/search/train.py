@@ -1,7 +1,7 @@
 """Training of the network: motions of one label come together, those of others apart.
 
-Supervised contrastive learning (Khosla et al. 2020); without labels every clip is its own label, and two variations of
-it are what comes together (Chen et al. 2020, SimCLR). The only place in the product that loads JAX.
+Supervised contrastive learning [Khosla2020]; without labels every clip is its own label, and two variations of it are
+what comes together (SimCLR [Chen2020]).
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ class Encoder(eqx.Module):
 def contrast(embedded: jax.Array, label: jax.Array) -> jax.Array:
     """Supervised contrastive loss of a batch: (B, D) unit rows and (B,) labels to one number.
 
-    Equation 2 of Khosla et al., "Supervised contrastive learning" (2020): the mean over rows of minus the mean
-    log-probability of the rows of the same label among all other rows.
+    Equation 2 of [Khosla2020]: the mean over rows of minus the mean log-probability of the rows of the same label among
+    all other rows.
     """
     n = len(label)
     itself = jnp.eye(n, dtype=bool)

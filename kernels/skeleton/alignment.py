@@ -397,7 +397,7 @@ def _is_square(rig: Rig) -> bool:
 
 
 def _mean(q: Float) -> Float:
-    """Mean rotation (4,) of (F, 4): the largest eigenvector of the sum of outer products (Markley et al. 2007)."""
+    """Mean rotation (4,) of (F, 4): the largest eigenvector of the sum of outer products [Markley2007]."""
     return np.asarray(np.linalg.eigh(q.T @ q)[1][:, -1], np.float64)
 
 

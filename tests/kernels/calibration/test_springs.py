@@ -24,7 +24,7 @@ def gap_rms_mm(model, stream, iterations):
 
 def test_few_iterations_oscillate_and_many_settle(received):
     gap = {n: gap_rms_mm(*received, n) for n in (1, 2, 3, 10, 30, 100)}
-    assert max(gap[2], gap[3]) > gap[1]  # the document's weakness
+    assert max(gap[2], gap[3]) > gap[1]  # the weakness [Kitsunai2007] says of itself
     assert gap[10] < gap[3]
     assert 0.3 < gap[30] < 1.0
     assert gap[100] < 0.1

@@ -1,4 +1,4 @@
-"""The document's encoder."""
+"""The encoder of [Ganbat2020]."""
 
 import numpy as np
 import pytest
