@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from kernels import rotation
 from kernels.calibration.gaps import aligned, bridge, fill
@@ -32,6 +33,35 @@ def test_bridges_beat_lines_in_a_swing_and_trust_slopes_less_in_long_gaps():
     assert near < 0.2 * np.abs(fill(series, is_good) - series).max()
     is_good[150:390] = False  # two whole swings unseen: no slope may carry the curve out of the room
     assert np.abs(bridge(series, is_good, frame_rate_hz=120.0)).max() < 3.0
+
+
+def bulge(width):
+    """How far a bridge rises between a rise of 1 a frame and a fall of as much, so many frames apart, at 120 Hz."""
+    left = np.arange(-60.0, 1.0)
+    series = np.concatenate([left, np.full(width - 1, 99.0), left[::-1]])[:, None, None]
+    is_good = (np.arange(len(series)) <= 60) | (np.arange(len(series)) >= 60 + width)
+    return bridge(series, is_good[:, None], frame_rate_hz=120.0)[60 + width // 2, 0, 0]
+
+
+def test_slopes_count_whole_up_to_a_quarter_of_a_second_and_the_less_the_longer_the_gap():
+    # a whole parabola rises by a quarter of its width; from 30 frames on the slopes count 30 / width of that
+    np.testing.assert_allclose([bulge(10), bulge(20), bulge(30)], [2.5, 5.0, 7.5])
+    np.testing.assert_allclose([bulge(60), bulge(120), bulge(240)], [7.5, 7.5, 7.5])
+
+
+@pytest.mark.parametrize("lost", [12, 30])
+def test_a_side_without_nine_good_frames_leaves_along_the_line(lost):
+    series = np.arange(44.0)[:, None, None] ** 2
+    is_good = np.ones((44, 1), bool)
+    is_good[18:24] = False
+    both = bridge(series, is_good, frame_rate_hz=120.0)[18:24, 0, 0]
+    is_good[lost] = False  # among the nine before the gap, or the nine after it
+    one = bridge(series, is_good, frame_rate_hz=120.0)[18:24, 0, 0]
+    line = fill(series, is_good)[18:24, 0, 0]
+    near, far = (0, -1) if lost < 18 else (-1, 0)
+    share = (one - line) / (both - line)  # of a parabola's two slopes each carries the whole at its own end
+    assert abs(share[near]) < abs(share[far])
+    assert 0 < share[near] < 0.5 < share[far] < 1
 
 
 def test_where_too_little_is_known_a_bridge_is_a_line():

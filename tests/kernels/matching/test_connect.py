@@ -7,6 +7,7 @@ from kernels.matching.connect import (
     LEAST_POSE_RAD,
     LEAST_SPEED_RAD_PER_S,
     JointPoses,
+    Thresholds,
     calibrate,
     connects,
     differences,
@@ -78,3 +79,54 @@ def test_one_frame_has_a_pose_and_no_velocity():
     found = poses_at(turning(1, 1.0), np.array([0.0, 9.0]), pace=np.ones(2))
     np.testing.assert_array_equal(found.velocity, np.zeros((2, 1, 3)))
     np.testing.assert_allclose(found.direction[:, 0, 0], 1)
+
+
+def test_each_clip_has_the_same_say_however_long_it_is():
+    short = (np.full(20, 0.4), np.full(20, 4.0))
+    long = (np.full(2000, 0.1), np.full(2000, 1.0))
+    assert calibrate([short, long]) == calibrate([long, short]) == Thresholds(0.4, 4.0)
+
+
+def test_thresholds_are_the_95th_percentile():
+    pose, speed = np.arange(1, 101) / 100, np.arange(100, 0, -1.0)
+    assert calibrate([(pose, speed)]) == Thresholds(0.95, 95.0)
+
+
+def test_a_clip_that_tells_nothing_does_not_count():
+    told = (np.full(5, 0.3), np.full(5, 2.0))
+    assert calibrate([(np.zeros(0), np.zeros(0)), told]) == Thresholds(0.3, 2.0)
+
+
+def test_each_threshold_has_its_own_floor():
+    assert calibrate([(np.full(5, 0.01), np.full(5, 2.0))]) == Thresholds(LEAST_POSE_RAD, 2.0)
+    assert calibrate([(np.full(5, 0.3), np.full(5, 0.01))]) == Thresholds(0.3, LEAST_SPEED_RAD_PER_S)
+
+
+def test_a_difference_at_its_threshold_connects_and_both_must():
+    limits = Thresholds(0.5, 2.0)
+    pose, speed = np.array([0.5, 0.5, 0.51, 0.1]), np.array([2.0, 2.01, 0.1, 0.1])
+    np.testing.assert_array_equal(connects(pose, speed, limits), [True, False, False, True])
+
+
+def test_velocity_is_taken_over_two_frames_on_either_side_and_over_what_there_is_at_the_ends():
+    direction = (np.arange(6.0) ** 3)[:, None, None] * np.ones((1, 1, 3))
+    found = poses_at(direction, np.array([0, 1, 3, 5]) / 120, pace=np.ones(4))
+    by_hand = [(8 - 0) / 2, (27 - 0) / 3, (125 - 1) / 4, (125 - 27) / 2]  # a frame
+    np.testing.assert_allclose(found.velocity[:, 0, 0], 120 * np.array(by_hand))
+
+
+def test_a_pose_is_that_of_the_nearest_frame():
+    direction = np.arange(6.0)[:, None, None] * np.ones((1, 1, 3))
+    found = poses_at(direction, np.array([-1.0, 1.4 / 120, 1.6 / 120, 9.0]), pace=np.ones(4))
+    np.testing.assert_array_equal(found.direction[:, 0, 0], [0, 1, 2, 5])
+
+
+def test_a_clip_tells_of_at_most_200_moments_and_a_short_one_of_each():
+    pose, speed = own_changes(turning(6000, 1.0), WEIGHT, apart_s=0.1)
+    assert len(pose) == len(speed) == 200
+    assert [len(own_changes(turning(n, 1.0), WEIGHT, apart_s=0.1)[0]) for n in (16, 17, 20)] == [0, 1, 4]
+
+
+def test_moments_are_at_least_a_frame_apart():
+    pose, _ = own_changes(turning(60, 3.0), WEIGHT, apart_s=1e-6)
+    np.testing.assert_allclose(pose, 3.0 / 120)

@@ -46,3 +46,18 @@ def test_means_of_beats():
 def test_one_bin_is_refused():
     with pytest.raises(ValueError, match="n_bins"):
         quantile_edges(np.ones(3), n_bins=1)
+
+
+def test_a_value_on_an_edge_counts_above_it():
+    np.testing.assert_array_equal(histogram(np.array([1.0, 0.5]), np.array([1.0])), [0.5, 0.5])
+    np.testing.assert_array_equal(histogram(np.array([1.0, 1.0]), np.array([1.0])), [0, 1])
+
+
+def test_a_stretch_of_no_frame_has_the_value_at_its_start():
+    np.testing.assert_array_equal(beat_means(np.arange(6.0) ** 2, np.array([0, 3, 3, 6])), [5 / 3, 9, 50 / 3])
+
+
+def test_agreement_is_the_mean_of_both_and_rises_with_each():
+    assert agreement(0.4, 0.2) == pytest.approx((0.4 + 0.6) / 2)
+    assert agreement(0.5, 0.2) > agreement(0.4, 0.2)
+    assert agreement(0.4, 0.3) > agreement(0.4, 0.2)
