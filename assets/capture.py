@@ -14,8 +14,9 @@ from assets.plots import calibration as calibration_plots
 from assets.sources.calibration import CalibrationError, Solvers, calibrate_file, up_axis
 from assets.sources.sources import Clip, Studio, session_version
 from assets.stamps import ClipStamp, Earlier, Part, Parts, Progress, content_version, version_of
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables.calibration import from_calibration
+from assets.tables.motion import from_pose, from_skeleton
 from kernels.skeleton.naming import map_joints
 from kernels.types import Clip as Motion
 from schemas.calibration import CALIBRATION
@@ -112,7 +113,7 @@ class _Reader:
         # What the disk refused may be readable next time: such a session is never taken for fresh.
         version = version_of(session_version(clips), "unread") if is_unread else session_version(clips)
         doubtful = [f"{r['path']}: {w}" for r in rows for w in r["warnings"]]  # type: ignore[attr-defined]
-        by_clip = {row["clip_id"]: tables.from_rows(CLIP, [row]) for row in rows if row["source_sha256"]}
+        by_clip = {row["clip_id"]: pack.from_rows(CLIP, [row]) for row in rows if row["source_sha256"]}
         made = {
             POSE.name: {key: reading.pose for key, reading in found.items()},
             SKELETON.name: {key: reading.skeleton for key, reading in found.items()},
@@ -121,14 +122,14 @@ class _Reader:
         parts = {
             table.name: Part(
                 session,
-                tables.concat(table, _filled(made[table.name])),
+                pack.concat(table, _filled(made[table.name])),
                 version,
                 _stamps(stamps, made[table.name]),
                 counts if table is POSE else {},
             )
             for table in (POSE, SKELETON)
         }
-        calibration = tables.concat(CALIBRATION, _filled(made[CALIBRATION.name]))
+        calibration = pack.concat(CALIBRATION, _filled(made[CALIBRATION.name]))
         solver = self._solvers(self._studio.settings().calibration.method) if calibration.num_rows else None
         parts[CALIBRATION.name] = Part(
             session,
@@ -140,7 +141,7 @@ class _Reader:
         )
         parts[CLIP.name] = Part(
             session,
-            tables.from_rows(CLIP, rows),
+            pack.from_rows(CLIP, rows),
             version,
             _stamps(stamps, {key: by_clip[key] for key in stamps}),
             counts
@@ -163,7 +164,7 @@ class _Reader:
         made_from = [{c: s.made_from for c, s in stamp.clips.items()} for stamp in stamps if stamp]
         agreed = {c for c, version in made_from[0].items() if all(m.get(c) == version for m in made_from)}
         clip, *parts = stored
-        of = [tables.by_clip(part) for part in parts]
+        of = [pack.by_clip(part) for part in parts]
         nothing = [table.empty() for table in order[1:]]
         return {
             row["clip_id"]: (
@@ -190,8 +191,8 @@ class _Reader:
         )
         return _Reading(
             row,
-            tables.from_skeleton(source.key, take.clip.skeleton, mapping),
-            tables.from_pose(source.key, take.clip),
+            from_skeleton(source.key, take.clip.skeleton, mapping),
+            from_pose(source.key, take.clip),
             CALIBRATION.empty(),
         )
 
@@ -217,8 +218,8 @@ class _Reader:
         )
         return _Reading(
             row,
-            tables.from_skeleton(source.key, found.clip.skeleton, mapping),
-            tables.from_pose(source.key, found.clip),
+            from_skeleton(source.key, found.clip.skeleton, mapping),
+            from_pose(source.key, found.clip),
             from_calibration(source.key, found),
         )
 

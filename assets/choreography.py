@@ -10,7 +10,8 @@ from assets.declare import refusals_fail, shown, table_asset
 from assets.partitions import DANCE, EVERY, SESSION_TABLES, lake_key
 from assets.sources.sources import Studio, request_of, request_version
 from assets.stamps import Part, Progress, Stored
-from assets.tables import pack as tables
+from assets.tables.choreography import from_choreography
+from assets.tables.music import to_music_beat
 from schemas.choreography import CHOREOGRAPHY
 from schemas.keys import base_method
 
@@ -40,7 +41,7 @@ def choreography(
     key = lake_key(context.partition_key)
     song_id, way = key.split("|")
     method = METHODS[base_method(way)]
-    beats = tables.to_music_beat(music_beat)
+    beats = to_music_beat(music_beat)
     if len(beats.time_s) < 2:
         reason = "; ".join(filter(None, song["reason"].to_pylist())) or "it has no beats"
         raise dg.Failure(f"{song_id}: cannot be danced: {reason}", allow_retries=False)
@@ -52,5 +53,5 @@ def choreography(
         check_order(method, order)
         danced = method.choose(inputs, order)
     progress.step()
-    rows = tables.from_choreography(song_id, way, danced.steps, danced.costs, danced.pin_ids, danced.states)
+    rows = from_choreography(song_id, way, danced.steps, danced.costs, danced.pin_ids, danced.states)
     return Part(key, rows, request_version(studio, key), metadata=shown(danced.metadata))

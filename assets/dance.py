@@ -10,11 +10,20 @@ import pyarrow as pa
 
 from assets.declare import table_asset, table_assets
 from assets.partitions import DANCE, EVERY, lake_key
-from assets.plots import draw as plots
+from assets.plots.dance import contact_sheet, dance_timeline, measure_table
+from assets.plots.draw import picture
 from assets.sources.sources import Studio, request_of, request_version
 from assets.stamps import Part, Progress, Stored
 from assets.tables import matching as matching_tables
-from assets.tables import pack as tables
+from assets.tables.choreography import (
+    from_dance_pose,
+    from_dance_quality,
+    from_frame_lineage,
+    to_choreography,
+    to_dance,
+)
+from assets.tables.motion import to_canonical_poses
+from assets.tables.music import to_music_beat
 from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
@@ -36,7 +45,7 @@ def load_clips(canonical_pose: Stored, steps: Choreography) -> dict[str, Clip]:
     for key in canonical_pose.keys:
         here = wanted & set(canonical_pose.stamp(key).clips)
         if here:
-            for moved in tables.to_canonical_poses(canonical_pose.read(key, clip_ids=here)):
+            for moved in to_canonical_poses(canonical_pose.read(key, clip_ids=here)):
                 images = {moved.clip_id: (moved.root_xyz_m, moved.rotation_wxyz)}
                 if mirrored(moved.clip_id) in names:
                     images[mirrored(moved.clip_id)] = mirror(moved.root_xyz_m, moved.rotation_wxyz)
@@ -65,7 +74,7 @@ def assembly(
     progress.begin("assembling the dance", 1)
     key = lake_key(context.partition_key)
     song_id, method = key.split("|")
-    steps = tables.to_choreography(choreography)
+    steps = to_choreography(choreography)
     clips, settings = load_clips(canonical_pose, steps), studio.settings().dance
     dance = assemble(
         steps,
@@ -79,10 +88,10 @@ def assembly(
         dance = lock_feet(dance, planted_feet(dance, steps, clips))
     progress.step()
     asked = request_version(studio, key)
-    pose = tables.from_dance_pose(song_id, method, dance)
-    sheet = dg.MetadataValue.md(plots.picture(plots.contact_sheet(dance, CANONICAL.parent.tolist()), "the dance"))
+    pose = from_dance_pose(song_id, method, dance)
+    sheet = dg.MetadataValue.md(picture(contact_sheet(dance, CANONICAL.parent.tolist()), "the dance"))
     yield dg.Output(Part(key, pose, asked, metadata={"sheet": sheet}), DANCE_POSE.name)
-    yield dg.Output(Part(key, tables.from_frame_lineage(song_id, method, dance, steps), asked), FRAME_LINEAGE.name)
+    yield dg.Output(Part(key, from_frame_lineage(song_id, method, dance, steps), asked), FRAME_LINEAGE.name)
 
 
 @table_asset(
@@ -112,9 +121,9 @@ def dance_quality(
     """Measure the finished dance: beats, warp, seams, feet, use of the catalogue."""
     progress.begin("judging the dance", 1)
     song_id, method = lake_key(context.partition_key).split("|")
-    steps = tables.to_choreography(choreography)
-    dance = tables.to_dance(dance_pose, frame_lineage, steps)
-    beat_s = tables.to_music_beat(music_beat).time_s
+    steps = to_choreography(choreography)
+    dance = to_dance(dance_pose, frame_lineage, steps)
+    beat_s = to_music_beat(music_beat).time_s
     grid_s, _ = cover(beat_s, float(steps.song_end_s[-1]))
     strength = matching_tables.strength_between(music_feature, grid_s)
     clips = load_clips(canonical_pose, steps)
@@ -132,10 +141,10 @@ def dance_quality(
     }
     progress.step()
     every = [measure for measures in found.values() for measure in measures]
-    timeline = plots.picture(plots.dance_timeline(dance, steps, beat_s), "timeline")
-    picture = dg.MetadataValue.md(f"{timeline}\n\n{plots.measures(every)}")
-    table = tables.from_dance_quality(song_id, method, every)
-    yield dg.Output(Part(f"{song_id}|{method}", table, metadata={"timeline": picture}))
+    timeline = picture(dance_timeline(dance, steps, beat_s), "timeline")
+    shown = dg.MetadataValue.md(f"{timeline}\n\n{measure_table(every)}")
+    table = from_dance_quality(song_id, method, every)
+    yield dg.Output(Part(f"{song_id}|{method}", table, metadata={"timeline": shown}))
     for name, measures in found.items():
         if name not in ("intensity", "catalogue"):
             yield _check(name, measures)

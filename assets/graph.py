@@ -11,10 +11,13 @@ import pyarrow as pa
 from assets.declare import table_assets
 from assets.graph_memory import Beats, Memory, keep, near_pairs, recall
 from assets.partitions import EVERY
-from assets.plots import draw as plots
+from assets.plots.draw import markdown
+from assets.plots.graph import motion_graph_picture
 from assets.sources.sources import Studio
 from assets.stamps import Part, Progress, Stored, version_of
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.graph import from_motion_graph_edge, from_motion_graph_node
+from assets.tables.motion import CanonicalClip, to_canonical_pose
 from kernels import rotation
 from kernels.graph.distance import PairDistance
 from kernels.graph.features import BeatFeatures, beat_features
@@ -94,8 +97,8 @@ def motion_graph(
     kept = losses[settings.prune]
     index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
     ids = [b.clip_id for b in beats]
-    node = tables.from_motion_graph_node(graph, ids, index, [labels[source_clip(clip)] for clip in ids], kept.is_kept)
-    edge = tables.from_motion_graph_edge(graph, ids, found.distance)
+    node = from_motion_graph_node(graph, ids, index, [labels[source_clip(clip)] for clip in ids], kept.is_kept)
+    edge = from_motion_graph_edge(graph, ids, found.distance)
     metadata = _metadata(found, losses, settings.prune) | {
         "device": getattr(pair_distance, "name", "reference"),
         "computed_clips": sum(b.version != (known[b.clip_id].version if b.clip_id in known else "") for b in beats),
@@ -124,7 +127,7 @@ def _session(
     known: Mapping[str, Beats],
 ) -> list[Beats]:
     """Take the beats of one session's clips with their features: remembered ones where nothing changed."""
-    beats = tables.by_clip(motion_beat.read(key))
+    beats = pack.by_clip(motion_beat.read(key))
     versions = {
         clip: version_of(stored.content, motion_beat.stamp(key).clips[clip].content)
         for clip, stored in canonical_pose.stamp(key).clips.items()
@@ -137,12 +140,12 @@ def _session(
         for clip, version in versions.items()
         if any(name not in known or known[name].version != version for name in images[clip])
     ]
-    poses = tables.by_clip(canonical_pose.read(key, clip_ids=changed)) if changed else {}
+    poses = pack.by_clip(canonical_pose.read(key, clip_ids=changed)) if changed else {}
     found = []
     for clip_id in beats:
         if clip_id in poses:
-            moved = tables.to_canonical_pose(poses[clip_id])
-            time_s = tables.to_numbers(beats[clip_id]["time_s"])
+            moved = to_canonical_pose(poses[clip_id])
+            time_s = pack.to_numbers(beats[clip_id]["time_s"])
             each = (moved, _image(moved))[: len(images[clip_id])]
             found += [_beats(image, time_s, versions[clip_id], settings) for image in each]
         elif clip_id in versions and clip_id not in changed:
@@ -150,14 +153,14 @@ def _session(
     return found
 
 
-def _image(moved: tables.CanonicalClip) -> tables.CanonicalClip:
+def _image(moved: CanonicalClip) -> CanonicalClip:
     """Mirror a clip, left for right."""
     root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
     position, _ = forward(CANONICAL, root, turned)
-    return tables.CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
+    return CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
 
 
-def _beats(moved: tables.CanonicalClip, beat_s: Float, version: str, settings: MotionGraphSettings) -> Beats:
+def _beats(moved: CanonicalClip, beat_s: Float, version: str, settings: MotionGraphSettings) -> Beats:
     """Take the beats of one clip with their features."""
     time_s = np.minimum(beat_s, moved.duration_s)
     features = beat_features(
@@ -198,13 +201,13 @@ def _by_label(node: pa.Table) -> str:
         )
         .sort("label")
     )
-    return plots.markdown(counted.columns, counted.rows())
+    return markdown(counted.columns, counted.rows())
 
 
 def _metadata(found: Transitions, losses: dict[str, Pruned], chosen: str) -> dict[str, object]:
     degree = np.bincount(found.graph.source, minlength=len(found.graph.time_s)).astype(np.float64)
-    picture = plots.motion_graph(found.graph.weight, found.threshold_used, degree)
-    loss = plots.markdown(
+    picture = motion_graph_picture(found.graph.weight, found.threshold_used, degree)
+    loss = markdown(
         ("pruning", "beats lost", "clips lost", "seconds lost", "of", "used"),
         [
             (

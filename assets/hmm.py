@@ -16,7 +16,7 @@ from assets.sources.performances import Performance
 from assets.sources.sources import Studio
 from assets.stamps import Part, Progress, Stored, repeatable
 from assets.tables import hmm as hmm_tables
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables.hmm import ClipMotions
 from kernels.hmm import evidence as evidence_of
 from kernels.hmm import states
@@ -81,7 +81,7 @@ def basic_motion(
         for key in canonical_pose.keys:
             here = set(canonical_pose.stamp(key).clips)
             here = here & performed if performed else here
-            poses = tables.by_clip(canonical_pose.read(key, clip_ids=here)) if here else {}
+            poses = pack.by_clip(canonical_pose.read(key, clip_ids=here)) if here else {}
             found += [cut(rows, settings.basic_motion) for rows in poses.values()]
             progress.step()
         found = sorted((c for c in found if len(c.motions.start_s)), key=lambda c: c.clip_id)

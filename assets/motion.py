@@ -8,14 +8,15 @@ import pyarrow as pa
 
 from assets.declare import code_version, table_asset
 from assets.partitions import SESSION
-from assets.plots import draw as plots
 from assets.plots import matching as matching_plots
+from assets.plots.motion import session_beats
 from assets.reading.motions import cut
 from assets.sources.sources import Studio
 from assets.stamps import Earlier, Part, Parts, Progress, Stored, clip_versions, per_clip, version_of
 from assets.tables import hmm as hmm_tables
 from assets.tables import matching as matching_tables
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.motion import from_canonical_pose, from_motion_beat, to_canonical_pose, to_pose, to_skeleton
 from kernels import rotation
 from kernels.hmm.states import assign
 from kernels.motion.beats import BeatSettings, motion_beats
@@ -45,19 +46,19 @@ def canonical_pose(
             clip: version_of(version, skeleton.stamp(key).clips[clip].content)
             for clip, version in clip_versions(pose, key, code).items()
         }
-        poses, skeletons = tables.by_clip(pose.read(key)), tables.by_clip(skeleton.read(key))
+        poses, skeletons = pack.by_clip(pose.read(key)), pack.by_clip(skeleton.read(key))
 
         def one(clip: str) -> pa.Table:
             if clip not in poses:
                 return CANONICAL_POSE.empty()
-            rig, mapping = tables.to_skeleton(skeletons[clip])
-            moved = tables.to_pose(poses[clip], rig)
+            rig, mapping = to_skeleton(skeletons[clip])
+            moved = to_pose(poses[clip], rig)
             try:
                 motion = retarget(moved, mapping)
             except ValueError as error:  # a body that only now turns out to be none must not stop its session
                 context.log.warning(f"{clip}: left out of the canonical poses: {error}")
                 return CANONICAL_POSE.empty()
-            return tables.from_canonical_pose(clip, moved.frame_rate_hz, motion)
+            return from_canonical_pose(clip, moved.frame_rate_hz, motion)
 
         return per_clip(CANONICAL_POSE, key, made_from, one, earlier=earlier, progress=progress)
 
@@ -79,12 +80,12 @@ def motion_beat(
     how = beat_settings(settings)
 
     def session(key: str) -> Part:
-        poses = tables.by_clip(canonical_pose.read(key))
+        poses = pack.by_clip(canonical_pose.read(key))
 
         def one(clip_id: str) -> pa.Table:
             if clip_id not in poses:
                 return MOTION_BEAT.empty()
-            moved = tables.to_canonical_pose(poses[clip_id])
+            moved = to_canonical_pose(poses[clip_id])
             heading = rotation.heading_rad(moved.rotation_wxyz[:, 0]) if settings.frame == "body" else None
             first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
             beats = motion_beats(
@@ -93,12 +94,12 @@ def motion_beat(
                 heading_rad=heading[first : last + 1] if heading is not None else None,
                 settings=how,
             )
-            return tables.from_motion_beat(clip_id, beats, moved.frame_rate_hz, first_frame=first)
+            return from_motion_beat(clip_id, beats, moved.frame_rate_hz, first_frame=first)
 
         part = per_clip(
             MOTION_BEAT, key, clip_versions(canonical_pose, key, code), one, earlier=earlier, progress=progress
         )
-        picture = plots.session_beats(part.table, clip.read(key))
+        picture = session_beats(part.table, clip.read(key))
         return Part(
             part.key, part.table, clips=part.clips, metadata={**part.metadata, "beats": dg.MetadataValue.md(picture)}
         )
@@ -119,7 +120,7 @@ def motion_feature(
     code = version_of(code_version(context, MOTION_FEATURE.name), repr(settings))
 
     def session(key: str) -> Part:
-        poses = tables.by_clip(canonical_pose.read(key))
+        poses = pack.by_clip(canonical_pose.read(key))
 
         def one(clip_id: str) -> pa.Table:
             return features_of(poses[clip_id], settings) if clip_id in poses else MOTION_FEATURE.empty()
@@ -150,7 +151,7 @@ def key_pose(
     code = version_of(code_version(context, KEY_POSE.name), repr(settings), kinds)
 
     def session(key: str) -> Part:
-        poses = tables.by_clip(canonical_pose.read(key))
+        poses = pack.by_clip(canonical_pose.read(key))
 
         def one(clip_id: str) -> pa.Table:
             if clip_id not in poses:
@@ -160,7 +161,7 @@ def key_pose(
 
         made_from = clip_versions(canonical_pose, key, code)
         part = per_clip(KEY_POSE, key, made_from, one, earlier=earlier, progress=progress)
-        known = int((tables.to_numbers(part.table["state_index"]) >= 0).sum())
+        known = int((pack.to_numbers(part.table["state_index"]) >= 0).sum())
         return replace(part, metadata={**part.metadata, "motions": part.table.num_rows, "of_known_kind": known})
 
     return Parts(session(key) for key in _begun(progress, "key poses", canonical_pose))
@@ -178,7 +179,7 @@ def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
     -------
     table ``motion_feature``, a row a value at 120 Hz
     """
-    moved = tables.to_canonical_pose(rows)
+    moved = to_canonical_pose(rows)
     found = motion_features(
         moved.position_xyz_m,
         moved.rotation_wxyz[:, 0],

@@ -10,12 +10,14 @@ from assets.declare import table_assets
 from assets.formats import audio, beats_file, midi
 from assets.formats.errors import FormatError
 from assets.partitions import SONG, lake_key
-from assets.plots import draw as plots
 from assets.plots import matching as matching_plots
+from assets.plots.draw import markdown
+from assets.plots.music import song_beats
 from assets.sources.sources import Song, Studio, brief_version, song_version
 from assets.stamps import Part, Parts, Progress, Stored, repeatable, version_of
 from assets.tables import matching as matching_tables
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.music import from_music_beat, from_music_loudness, from_music_tempo, to_music_beat
 from kernels.assembly.timing import cover
 from kernels.music.beats import BeatAnalysis, TempoCandidate, track_beats
 from kernels.music.features import music_features
@@ -175,22 +177,22 @@ def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
     parts = {table.name: Part(key, table.empty(), version) for table in _TABLES}
     parts |= _heard_parts(key, danceable, version) if danceable else {}
     parts[schema.SONG.name] = Part(
-        key, tables.from_rows(schema.SONG, rows), version, metadata={"refusals": "; ".join(refused) or "none"}
+        key, pack.from_rows(schema.SONG, rows), version, metadata={"refusals": "; ".join(refused) or "none"}
     )
     return parts
 
 
 def _heard_parts(key: str, heard: Heard, version: str) -> dict[str, Part]:
     grid, candidates = heard.analysis.grid, heard.analysis.tempo_candidates
-    picture = plots.song_beats(grid, heard.time_s, heard.loudness_db)
-    levels = plots.markdown(
+    picture = song_beats(grid, heard.time_s, heard.loudness_db)
+    levels = markdown(
         ("level", "beats/min", "score", "chosen"),
         [(c.level_ratio, c.tempo_bpm, c.score, "yes" if c.is_chosen else "") for c in candidates],
     )
     made = {
-        schema.MUSIC_BEAT.name: (tables.from_music_beat(key, grid), {"beats": dg.MetadataValue.md(picture)}),
-        schema.MUSIC_TEMPO.name: (tables.from_music_tempo(key, candidates), {"levels": dg.MetadataValue.md(levels)}),
-        schema.MUSIC_LOUDNESS.name: (tables.from_music_loudness(key, heard.time_s, heard.loudness_db), {}),
+        schema.MUSIC_BEAT.name: (from_music_beat(key, grid), {"beats": dg.MetadataValue.md(picture)}),
+        schema.MUSIC_TEMPO.name: (from_music_tempo(key, candidates), {"levels": dg.MetadataValue.md(levels)}),
+        schema.MUSIC_LOUDNESS.name: (from_music_loudness(key, heard.time_s, heard.loudness_db), {}),
     }
     return {name: Part(key, table, version, metadata=metadata) for name, (table, metadata) in made.items()}
 
@@ -247,7 +249,7 @@ def music_analysis(
     for key in keys:
         version = version_of(song_version(songs.get(key, ())), brief_version(studio, songs.get(key, ())))
         read = [row for row in song.read(key).to_pylist() if row["state"] == "read"]
-        grid = tables.to_music_beat(music_beat.read(key))
+        grid = to_music_beat(music_beat.read(key))
         if read and len(grid.time_s) >= 2:
             with repeatable():
                 made.append(_analysed(key, read[0], grid, studio, version))

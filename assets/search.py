@@ -16,8 +16,9 @@ from assets.partitions import EVERY, SESSION
 from assets.plots import search as search_plots
 from assets.sources.sources import Studio
 from assets.stamps import Earlier, Part, Parts, Progress, Stored, clip_versions, content_version, per_clip, repeatable
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables import search as search_tables
+from assets.tables.motion import CanonicalClip, to_canonical_pose, to_canonical_poses
 from kernels.search.aligned import track
 from kernels.search.encoder import Encoder, from_arrays
 from kernels.search.measure import leave_one_out
@@ -106,7 +107,7 @@ def _examples(clip: Stored, canonical_pose: Stored, settings: SearchSettings) ->
     found = []
     for key in canonical_pose.keys:
         rows = {row["clip_id"]: row for row in clip.read(key).to_pylist() if row["state"] == "read"}
-        for moved in tables.to_canonical_poses(canonical_pose.read(key)):
+        for moved in to_canonical_poses(canonical_pose.read(key)):
             if moved.clip_id not in rows:
                 continue
             row = rows[moved.clip_id]
@@ -157,10 +158,10 @@ def motion_embedding(
     )
 
     def session(key: str) -> Part:
-        poses = tables.by_clip(canonical_pose.read(key))
+        poses = pack.by_clip(canonical_pose.read(key))
 
         def one(clip_id: str) -> pa.Table:
-            return _embedded(tables.to_canonical_pose(poses[clip_id]), encoder, settings) if clip_id in poses else empty
+            return _embedded(to_canonical_pose(poses[clip_id]), encoder, settings) if clip_id in poses else empty
 
         made_from = clip_versions(canonical_pose, key, *made_by)
         return per_clip(MOTION_EMBEDDING, key, made_from, one, earlier=earlier, progress=progress)
@@ -170,7 +171,7 @@ def motion_embedding(
     return Parts(session(key) for key in canonical_pose.keys)
 
 
-def _embedded(moved: tables.CanonicalClip, encoder: Encoder, settings: SearchSettings) -> pa.Table:
+def _embedded(moved: CanonicalClip, encoder: Encoder, settings: SearchSettings) -> pa.Table:
     cut = _windows(moved.duration_s, settings)
     vector = encoder.embed(moved.position_xyz_m, moved.frame_rate_hz, cut)
     followed = track(moved.position_xyz_m, moved.frame_rate_hz)

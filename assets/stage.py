@@ -20,7 +20,8 @@ from assets.formats.usd_character import is_file
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.sources.sources import Studio
 from assets.stamps import Progress, Stored
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.choreography import to_choreography
 from kernels.music.preview import render_preview
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Choreography, Clip
@@ -77,12 +78,12 @@ def usd_animation(
     key = lake_key(context.partition_key)
     song_id, method = key.split("|")
     played = next(row for row in song.to_pylist() if row["state"] == "read")
-    steps = tables.to_choreography(choreography)
+    steps = to_choreography(choreography)
     moved = Clip(
         CANONICAL,
-        tables.frame_rate_hz(dance_pose),
-        tables.to_array(dance_pose["root_xyz_m"]),
-        tables.to_array(dance_pose["rotation_wxyz"]),
+        pack.frame_rate_hz(dance_pose),
+        pack.to_array(dance_pose["root_xyz_m"]),
+        pack.to_array(dance_pose["rotation_wxyz"]),
     )
     provenance = _provenance(played, method, steps, clip)
     refuse_changed(frame_lineage, {row["clip_id"]: row["licence"] for row in provenance["clips"]})
@@ -191,19 +192,19 @@ def lineage_of(frames: pa.Table, choreography: pa.Table) -> dict[str, Any]:
     -------
     dict of F values each
     """
-    time_s = tables.to_numbers(frames["time_s"])
-    start_s = tables.to_numbers(choreography["song_start_s"])
+    time_s = pack.to_numbers(frames["time_s"])
+    start_s = pack.to_numbers(choreography["song_start_s"])
     step = np.clip(np.searchsorted(start_s, time_s + 1e-9, side="right") - 1, 0, len(start_s) - 1)
     told = [json.dumps(told_step(row), sort_keys=True) for row in choreography.to_pylist()]
     return {
         "odori:clip": frames["clip_id"].to_pylist(),
-        "odori:clipTime": tables.to_numbers(frames["clip_time_s"]),
+        "odori:clipTime": pack.to_numbers(frames["clip_time_s"]),
         "odori:mirrored": frames["is_mirrored"].to_pylist(),
         "odori:blendClip": [partner or "" for partner in frames["blend_clip_id"].to_pylist()],
         "odori:blendTime": np.nan_to_num(frames["blend_time_s"].to_numpy().astype(np.float64)),
         "odori:blendMirrored": frames["is_blend_mirrored"].to_pylist(),
-        "odori:blendWeight": tables.to_numbers(frames["blend_weight_ratio"]),
-        "odori:warp": tables.to_numbers(frames["warp_ratio"]),
+        "odori:blendWeight": pack.to_numbers(frames["blend_weight_ratio"]),
+        "odori:warp": pack.to_numbers(frames["warp_ratio"]),
         "odori:step": [told[i] for i in step.tolist()],
     }
 

@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from threadpoolctl import threadpool_limits
 
-from assets.tables import pack as tables
+from assets.tables import pack
 from schemas.table import Table
 
 
@@ -272,7 +272,7 @@ def per_clip(
     known = stamp.clips if stamp else {}
     unchanged = {clip for clip, version in made_from.items() if clip in known and known[clip].made_from == version}
     before = earlier.table(table.name, key) if unchanged else None
-    rows = tables.by_clip(before) if before is not None else {}
+    rows = pack.by_clip(before) if before is not None else {}
     parts, stamps, n_computed = [], {}, 0
     with repeatable():
         for clip, version in made_from.items():
@@ -291,7 +291,7 @@ def per_clip(
 
 def _joined(table: Table, parts: Sequence[pa.Table]) -> pa.Table:
     filled = [p for p in parts if p.num_rows] or list(parts[:1])
-    return tables.concat(table, filled)
+    return pack.concat(table, filled)
 
 
 def clip_versions(stored: Stored, key: str, *also: str) -> dict[str, str]:

@@ -26,7 +26,8 @@ REPOSITORY = Path(__file__).parents[1]
 sys.path.insert(0, str(REPOSITORY))
 
 from assets.formats import bvh, midi  # noqa: E402
-from assets.tables import pack as tables  # noqa: E402
+from assets.tables import pack  # noqa: E402
+from assets.tables.motion import to_canonical_poses  # noqa: E402
 from kernels.hmm.character import chance_of, nearest_dancer, pose_windows  # noqa: E402
 from kernels.synthetic import performance as made_up  # noqa: E402
 from kernels.types import Float  # noqa: E402
@@ -87,7 +88,7 @@ def known_takes(root: Path, dancers: list[str]) -> list[Float]:
     for name in dancers:
         clips = lake.table("clip", name).to_pylist()
         wanted = [row["clip_id"] for row in clips if row["subject"] == f"known_{name}"]
-        moved = tables.to_canonical_poses(lake.table("canonical_pose", name, clip_ids=wanted))
+        moved = to_canonical_poses(lake.table("canonical_pose", name, clip_ids=wanted))
         found.append(np.concatenate([pose_windows(m.position_xyz_m, m.frame_rate_hz) for m in moved]))
     return found
 
@@ -100,7 +101,7 @@ def dances(root: Path, dancer: str, songs: list[str]) -> list[Float]:
         raise SystemExit("; ".join(made.troubles))
     lake = StudioFolder(root).lake
     rows = [lake.table("dance_pose", f"{song}|hmm") for song in songs]
-    return [pose_windows(tables.to_array(r["position_xyz_m"]), tables.frame_rate_hz(r)) for r in rows]
+    return [pose_windows(pack.to_array(r["position_xyz_m"]), pack.frame_rate_hz(r)) for r in rows]
 
 
 def judged(root: Path, dancers: list[str], songs: list[str]) -> Mapping[str, float]:

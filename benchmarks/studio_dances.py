@@ -23,7 +23,8 @@ from assets.dancing.asked import Direction
 from assets.dancing.by_graph import Catalogue, by_graph, catalogue
 from assets.reading.clips import read_clips
 from assets.reading.songs import PlayedSong, heard_song
-from assets.tables import pack as tables
+from assets.tables.graph import to_motion_graph
+from assets.tables.music import to_music_beat
 from kernels.types import Choreography, Clip, Float
 from pipelines.io_managers import StoredTable
 from pipelines.studio.lake import Lake
@@ -69,15 +70,13 @@ class BuiltStudio:
 
     def catalogue(self) -> Catalogue:
         """Read the motion graph and what is known of its clips."""
-        graph, clip_ids = tables.to_motion_graph(
-            self._lake.table("motion_graph_node"), self._lake.table("motion_graph_edge")
-        )
+        graph, clip_ids = to_motion_graph(self._lake.table("motion_graph_node"), self._lake.table("motion_graph_edge"))
         clip = self.stored("clip")
         return catalogue(graph, clip_ids, read_clips(clip), ())
 
     def song(self, key: str) -> PlayedSong:
         """Read the beats of a song."""
-        grid = tables.to_music_beat(self._lake.table("music_beat", key))
+        grid = to_music_beat(self._lake.table("music_beat", key))
         duration_s = float(max(self._lake.table("song", key)["duration_s"].to_pylist()))
         feature, repeat = (self._lake.table(name, key) for name in ("music_feature", "music_repeat"))
         return heard_song(grid, duration_s, feature=feature, repeat=repeat)

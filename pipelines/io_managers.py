@@ -18,7 +18,7 @@ from assets.partitions import dagster_key, lake_key
 from assets.search import Index
 from assets.stage import Stage
 from assets.stamps import Part, Parts, Stamp, content_version
-from assets.tables import pack as tables
+from assets.tables import pack
 from pipelines.freshness import Freshness
 from pipelines.studio.files import LakeError, why, write_beside
 from pipelines.studio.folder import StudioFolder
@@ -171,7 +171,7 @@ class StageIOManager(LakeIOManager):
             for path in written
         ]
         key = f"{obj.song_id}|{obj.method}"
-        super().handle_output(context, Part(key, tables.from_rows(USD_ANIMATION, rows), obj.asked))
+        super().handle_output(context, Part(key, pack.from_rows(USD_ANIMATION, rows), obj.asked))
 
 
 def write_dance(folder: Path, stage: Stage) -> list[Path]:

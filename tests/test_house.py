@@ -142,7 +142,7 @@ UNDOCUMENTED = {
         "assets": "dance graph_memory stage",
         "assets/dancing": "by_graph by_hmm characters proposals wishes",
         "assets/plots": "hmm search",
-        "assets/tables": "hmm pack search",
+        "assets/tables": "choreography graph hmm motion music pack search",
         "pipelines": "build cli collection freshness io_managers jobs resources schedules sensors web",
         "pipelines/studio": "files folder lake",
         "pipelines/commands": "asked build calibrate check dance dance_report hmm_report progress propose session "

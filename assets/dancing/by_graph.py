@@ -15,11 +15,11 @@ from assets.dancing.method import DanceOrder, Method
 from assets.dancing.pose_pins import Poses, to_pose_pins
 from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import GRAPH_PARTS, DirectionError, Nodes, Parts
-from assets.plots import draw as plots
+from assets.plots.dance import phrase_table
 from assets.reading.clips import read_clips
 from assets.reading.songs import PlayedSong, heard_song
 from assets.stamps import Stored
-from assets.tables import pack as tables
+from assets.tables.graph import to_motion_graph
 from kernels.assembly.timing import blend_widths, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts, intensity_price
@@ -158,7 +158,7 @@ def by_graph(known: Catalogue, song: PlayedSong, settings: Settings, asked: Dire
             "parts_danced_again": n_repeated,
             "shared_with_the_best": shared_ratio(graph, path, found[0]) if len(found) > 1 else 1.0,
             "pins": (kept_pins(pins, song, path, known)),
-            "phrases": Markdown(plots.phrase_table(steps)),
+            "phrases": Markdown(phrase_table(steps)),
         },
         [pin_of_step(pins, int(k), int(d)) for k, d in zip(path.beat_index[kept], path.beat_span[kept], strict=True)],
     )
@@ -352,7 +352,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
     RefusalError
         As :func:`by_graph`.
     """
-    graph, clip_ids = tables.to_motion_graph(inputs["motion_graph_node"].read(), inputs["motion_graph_edge"].read())
+    graph, clip_ids = to_motion_graph(inputs["motion_graph_node"].read(), inputs["motion_graph_edge"].read())
     poses = poses_of(inputs["canonical_pose"], order.settings)
     known = catalogue(graph, clip_ids, read_clips(inputs["clip"]), order.direction.allow, poses=poses)
     feature, repeat = (inputs[name].read(order.song_id) for name in ("music_feature", "music_repeat"))

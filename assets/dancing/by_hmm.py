@@ -15,8 +15,8 @@ from assets.dancing.method import DanceOrder, Method
 from assets.dancing.recordings import choose_recordings, ends_of
 from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import Nodes
-from assets.plots import draw as plots
 from assets.plots import hmm as hmm_plots
+from assets.plots.dance import phrase_table
 from assets.reading.clips import read_clips
 from assets.reading.hearing import hear
 from assets.reading.songs import PlayedSong, heard_song
@@ -250,7 +250,7 @@ def by_hmm(
         "basic_motions_danced": len(np.unique(spans.state)),
         "as_the_model_alone_ratio": _shared(spans, alone, len(music.log_likelihood)),
         "music_adds": dancer.evidence.music_adds,
-        "phrases": Markdown(plots.phrase_table(steps)),
+        "phrases": Markdown(phrase_table(steps)),
         "states": Markdown(hmm_plots.timeline(edge_s, spans.state, song.grid_s)),
     }
     spanned = zip(spans.start[span_of].tolist(), spans.length[span_of].tolist(), strict=True)

@@ -11,11 +11,11 @@ from assets.dancing.danced import Danced, Markdown
 from assets.dancing.match_pieces import LoadedMatches, Piece, load_matches, pieces_of
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.refusal import RefusalError
-from assets.plots import draw as plots
 from assets.plots import matching as matching_plots
+from assets.plots.dance import phrase_table
 from assets.reading.clips import read_clips
 from assets.stamps import Stored, repeatable
-from assets.tables import pack as tables
+from assets.tables.motion import to_canonical_poses
 from kernels.assembly.timing import blend_widths, cover
 from kernels.matching import connect, path
 from kernels.motion.features import at_feature_rate, link_directions, link_weights
@@ -111,7 +111,7 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         "clips": len(set(steps.clip_id)),
         "starts_snapped_to_clip_beats": sum(p.is_snapped for p in used),
         "spans_without_a_match": sum(p.rank_number == 0 for p in used),
-        "phrases": Markdown(plots.phrase_table(steps)),
+        "phrases": Markdown(phrase_table(steps)),
         "choice": Markdown(matching_plots.chosen(spans, used, chosen)),
     }
     return Danced(steps, costs, metadata)
@@ -189,7 +189,7 @@ def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str,
     for key in canonical_pose.keys:
         here = wanted & set(canonical_pose.stamp(key).clips)
         rows: pa.Table | None = canonical_pose.read(key, clip_ids=here) if here else None
-        for moved in tables.to_canonical_poses(rows) if rows is not None else ():
+        for moved in to_canonical_poses(rows) if rows is not None else ():
             position = at_feature_rate(moved.position_xyz_m, moved.frame_rate_hz)
             root = at_feature_rate(moved.rotation_wxyz[:, 0], moved.frame_rate_hz)
             first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)

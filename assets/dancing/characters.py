@@ -8,7 +8,7 @@ from assets.formats.errors import FormatError
 from assets.formats.usd_character import Copy, Rig
 from assets.sources.sources import FilePath, Sources, Studio, brief_of, fingerprint, request_of
 from assets.stamps import Stored
-from assets.tables import pack as tables
+from assets.tables.motion import to_pose, to_skeleton
 from kernels.skeleton import grounding, kinematics
 from kernels.skeleton.canonical import LEG_LENGTH_M
 from kernels.skeleton.character import leg_length_m, measure
@@ -94,8 +94,8 @@ def read_clip(clip_id: str, skeleton: Stored, pose: Stored) -> Cast:
         raise CharacterError(
             f"{clip_id}: want a clip that was read, or a USD file, got no such clip; see 'odori status'"
         )
-    rig, mapping = tables.to_skeleton(rows)
-    moved = tables.to_pose(pose.read(session, clip_ids={clip_id}), rig)
+    rig, mapping = to_skeleton(rows)
+    moved = to_pose(pose.read(session, clip_ids={clip_id}), rig)
     try:
         found = measure(moved, mapping)
     except ValueError as error:

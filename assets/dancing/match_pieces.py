@@ -7,7 +7,7 @@ import numpy as np
 
 from assets.stamps import Stored
 from assets.tables import matching as matching_tables
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables.matching import Rhythm, StoredMatches
 from kernels.matching import intensity
 from kernels.matching.pieces import ease_pace, longest_first, motion_under, other_starts, snap_start, split_span
@@ -118,25 +118,25 @@ def load_matches(
         here = wanted & set(motion_feature.stamp(key).clips)
         if not here:
             continue
-        beats = tables.by_clip(motion_beat.read(key, clip_ids=here))
-        for clip, rows in tables.by_clip(motion_feature.read(key, clip_ids=here)).items():
+        beats = pack.by_clip(motion_beat.read(key, clip_ids=here))
+        for clip, rows in pack.by_clip(motion_feature.read(key, clip_ids=here)).items():
             clips[clip] = ClipFeatures(
-                np.asarray(tables.to_numbers(rows["rhythm"]), np.float32),
-                tables.to_numbers(rows["peak_effort_rad_per_s"]).astype(np.float64),
-                tables.to_numbers(beats[clip]["time_s"]).astype(np.float64) if clip in beats else np.zeros(0),
+                np.asarray(pack.to_numbers(rows["rhythm"]), np.float32),
+                pack.to_numbers(rows["peak_effort_rad_per_s"]).astype(np.float64),
+                pack.to_numbers(beats[clip]["time_s"]).astype(np.float64) if clip in beats else np.zeros(0),
             )
     music = music_feature.read(song_id)
     return LoadedMatches(
         segments,
-        np.asarray(tables.to_numbers(music["rhythm"]), np.float32),
-        tables.to_numbers(music["intensity"]).astype(np.float64),
+        np.asarray(pack.to_numbers(music["rhythm"]), np.float32),
+        pack.to_numbers(music["intensity"]).astype(np.float64),
         matches,
         clips,
     )
 
 
 def _longest(motion_feature: Stored, may_dance: Container[str], *, most: int = 20) -> set[str]:
-    sizes = {c: r.num_rows for key in motion_feature.keys for c, r in tables.by_clip(motion_feature.read(key)).items()}
+    sizes = {c: r.num_rows for key in motion_feature.keys for c, r in pack.by_clip(motion_feature.read(key)).items()}
     names = sorted(clip for clip in sizes if clip in may_dance)
     return {names[i] for i in longest_first(np.array([sizes[n] for n in names], np.int64), most=most)}
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from assets.dancing.wishes import DirectionError, stretch
 from assets.reading.songs import PlayedSong
 from assets.stamps import Stored
-from assets.tables import pack as tables
+from assets.tables.motion import CanonicalClip, to_canonical_poses
 from kernels.graph.distance import pose_distance
 from kernels.graph.features import VELOCITY_TIME_S, BeatFeatures, beat_features
 from kernels.graph.path import STEPS
@@ -43,7 +43,7 @@ class Poses:
     stored: Stored
     threshold: float = THRESHOLD
 
-    def read(self, names: Sequence[str]) -> Iterator[tables.CanonicalClip]:
+    def read(self, names: Sequence[str]) -> Iterator[CanonicalClip]:
         """Read some clips; those with names of mirrored ones, mirrored. Clips there are not are left out.
 
         Parameters
@@ -57,13 +57,13 @@ class Poses:
         wanted = {source_clip(name) for name in names}
         for key in self.stored.keys:
             here = wanted & set(self.stored.stamp(key).clips)
-            for moved in tables.to_canonical_poses(self.stored.read(key, clip_ids=here)) if here else ():
+            for moved in to_canonical_poses(self.stored.read(key, clip_ids=here)) if here else ():
                 if moved.clip_id in names:
                     yield moved
                 if mirrored(moved.clip_id) in names:
                     root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
                     position, _ = forward(CANONICAL, root, turned)
-                    yield tables.CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
+                    yield CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
 
     def wanted(self, wish: PinWish) -> BeatFeatures | None:
         """Take the pose of a wish; None where there is no such clip.
@@ -254,7 +254,7 @@ def moment_of(wish: PinWish, song: PlayedSong) -> float:
     return float(max(song.grid_s[stretch(wish, song)[0]], 0.0))
 
 
-def _features(moved: tables.CanonicalClip, time_s: Float, *, velocity_time_s: float = VELOCITY_TIME_S) -> BeatFeatures:
+def _features(moved: CanonicalClip, time_s: Float, *, velocity_time_s: float = VELOCITY_TIME_S) -> BeatFeatures:
     return beat_features(
         moved.rotation_wxyz,
         moved.position_xyz_m,
@@ -268,7 +268,7 @@ def shown_pose(
     wish: PinWish,
     moment_s: float,
     lineage: pl.DataFrame,
-    dance: tables.CanonicalClip,
+    dance: CanonicalClip,
     poses: Poses,
     beats: pl.DataFrame,
 ) -> dict[str, Any]:

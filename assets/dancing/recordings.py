@@ -9,7 +9,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from assets.stamps import Stored
-from assets.tables import pack as tables
+from assets.tables.motion import CanonicalClip, to_canonical_poses
 from kernels.graph.features import beat_features
 from kernels.hmm import instances
 from kernels.hmm.decode import Chain
@@ -38,13 +38,13 @@ def ends_of(motions: Motions, clip_ids: tuple[str, ...], canonical_pose: Stored,
     for key in canonical_pose.keys:
         here = set(wanted) & set(canonical_pose.stamp(key).clips)
         rows: pa.Table | None = canonical_pose.read(key, clip_ids=here) if here else None
-        for moved in tables.to_canonical_poses(rows) if rows is not None else ():
+        for moved in to_canonical_poses(rows) if rows is not None else ():
             at = wanted[moved.clip_id]
             found[moved.clip_id] = _ends(moved, motions.start_s[at], motions.end_s[at], blend_s)
     return concatenate_ends([found[clip] for clip in wanted])
 
 
-def _ends(moved: tables.CanonicalClip, start_s: Float, end_s: Float, blend_s: float) -> Ends:
+def _ends(moved: CanonicalClip, start_s: Float, end_s: Float, blend_s: float) -> Ends:
     n = len(start_s)
     time_s = np.minimum(np.concatenate([start_s, end_s]), moved.duration_s)
     rate_hz = moved.frame_rate_hz

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from assets.plots.draw import COOL, INK, WARM, figure_of, markdown, picture, plain, png
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables.calibration import to_curves
 
 _CONFIDENCE = {"high": "#3c8c50", "medium": "#c8a01e", "low": WARM, "axis-unobserved": "#8c3c96", "none": INK}
@@ -29,7 +29,7 @@ def session(rows: pa.Table, doubtful: Sequence[str]) -> str:
     str
         Markdown; ``no suit recordings`` where there is nothing to show. Pictures of the first six recordings.
     """
-    by_clip = tables.by_clip(rows)
+    by_clip = pack.by_clip(rows)
     if not by_clip and not doubtful:
         return "no suit recordings"
     parts = [f"- {line}" for line in doubtful[:_MOST_WARNINGS]]
@@ -106,7 +106,7 @@ def residuals(joints: pa.Table) -> bytes:
     gap.legend(fontsize=7, frameon=False, loc="center right")
     bones = right.add_subplot()
     words = joints["confidence_label"].to_pylist()
-    length_mm = 1000 * tables.to_numbers(joints["length_m"])
+    length_mm = 1000 * pack.to_numbers(joints["length_m"])
     bones.barh(range(len(names)), length_mm, color=[_CONFIDENCE[word] for word in words])
     for k, value in enumerate(length_mm):
         bones.text(value, k, f" {value:.0f}", fontsize=7, va="center")

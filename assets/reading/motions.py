@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
-from assets.tables import pack as tables
+from assets.tables.motion import to_canonical_pose
 from kernels.motion.key_poses import KeyPoses, angular_speed, key_poses, pose_vectors
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton import kinematics
@@ -38,7 +38,7 @@ def cut(rows: pa.Table, settings: BasicMotionSettings) -> Cut:
     Cut
         Without motions where the clip has no key poses.
     """
-    moved = tables.to_canonical_pose(rows)
+    moved = to_canonical_pose(rows)
     first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
     used = slice(first, last + 1)
     _, orientation = kinematics.forward(CANONICAL, moved.root_xyz_m[used], moved.rotation_wxyz[used])

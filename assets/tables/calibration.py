@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from assets.sources.calibration import Calibrated
-from assets.tables import pack as tables
+from assets.tables import pack
 from kernels import rotation
 from kernels.calibration.records import JOINTS, SENSORS
 from kernels.types import Float
@@ -53,12 +53,12 @@ def from_calibration(clip_id: str, found: Calibrated) -> pa.Table:
         "joint_index": pa.array(np.arange(1, n + 1), pa.int32()),
         "joint_name": pa.array([joint.joint for joint in joints], pa.string()),
         "parent_name": pa.array([joint.parent for joint in joints], pa.string()),
-        "offset_xyz_m": tables.vector(found.clip.skeleton.offset_xyz_m[1 : len(SENSORS)]),
-        "sensor_xyz_m": tables.vector(rotation.apply(rest, -in_child)),
-        "sensor_wxyz": tables.quaternion(rest),
-        "in_parent_sensor_xyz_m": tables.vector(found.calibration.in_parent_sensor_m),
-        "in_child_sensor_xyz_m": tables.vector(in_child),
-        "range_of_motion_rad": tables.vector(np.stack([joint.range_of_motion_rad for joint in joints])),
+        "offset_xyz_m": pack.vector(found.clip.skeleton.offset_xyz_m[1 : len(SENSORS)]),
+        "sensor_xyz_m": pack.vector(rotation.apply(rest, -in_child)),
+        "sensor_wxyz": pack.quaternion(rest),
+        "in_parent_sensor_xyz_m": pack.vector(found.calibration.in_parent_sensor_m),
+        "in_child_sensor_xyz_m": pack.vector(in_child),
+        "range_of_motion_rad": pack.vector(np.stack([joint.range_of_motion_rad for joint in joints])),
         "rank": pa.array([joint.rank for joint in joints], pa.int32()),
         "confidence_label": pa.array([joint.confidence for joint in joints], pa.string()),
         "advice": pa.array([joint.advice or None for joint in joints], pa.string()),

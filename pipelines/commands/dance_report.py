@@ -16,7 +16,9 @@ from assets.dancing.wishes import stretch
 from assets.formats import usd_package
 from assets.reading.songs import PlayedSong
 from assets.stage import COSTS
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.motion import CanonicalClip
+from assets.tables.music import to_music_beat
 from kernels.assembly.timing import cover
 from pipelines.commands import hmm_report
 from pipelines.io_managers import StoredTable
@@ -102,7 +104,7 @@ def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame
     wishes = direction_of(studio, f"{song}|{method}").wishes
     if not wishes:
         return []
-    beats = tables.to_music_beat(studio.lake.table("music_beat", song))
+    beats = to_music_beat(studio.lake.table("music_beat", song))
     duration_s = max(studio.lake.table("song", song)["duration_s"].to_pylist())
     played = PlayedSong(cover(beats.time_s, duration_s)[0], beats, duration_s)
     clips = {row["clip_id"]: row for s in studio.lake.keys("clip") for row in studio.lake.table("clip", s).to_pylist()}
@@ -136,8 +138,8 @@ class _Posed:
         self._played = played
         self._lineage = pl.DataFrame(lake.table("frame_lineage", key))
         frames = lake.table("dance_pose", key)
-        moved = [tables.to_array(frames[name]) for name in ("root_xyz_m", "rotation_wxyz", "position_xyz_m")]
-        self._dance = tables.CanonicalClip(key, tables.frame_rate_hz(frames), *moved)
+        moved = [pack.to_array(frames[name]) for name in ("root_xyz_m", "rotation_wxyz", "position_xyz_m")]
+        self._dance = CanonicalClip(key, pack.frame_rate_hz(frames), *moved)
         stored = StoredTable(lake, "canonical_pose", lake.keys("canonical_pose"))
         self._poses = poses_of(stored, studio.settings())
         self._nodes = pl.DataFrame(lake.table("motion_graph_node"))

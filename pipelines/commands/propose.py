@@ -11,7 +11,8 @@ from assets.dancing.methods import USUAL
 from assets.dancing.refusal import RefusalError
 from assets.reading.clips import read_clips
 from assets.reading.songs import heard_song
-from assets.tables import pack as tables
+from assets.tables.graph import to_motion_graph
+from assets.tables.music import to_music_beat
 from pipelines import build as building
 from pipelines.commands.asked import pin_texts, wanted_songs
 from pipelines.commands.outcome import DONE, NOTHING_DONE, Outcome
@@ -39,7 +40,7 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
         If the place is none of the song's.
     """
     lake = studio.lake
-    beats = tables.to_music_beat(lake.table("music_beat", song))
+    beats = to_music_beat(lake.table("music_beat", song))
     if len(beats.time_s) < 2:
         raise StudioError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
     duration_s = float(max(lake.table("song", song)["duration_s"].to_pylist()))
@@ -50,7 +51,7 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
     except ValueError as error:
         raise StudioError(f"--propose: {str(error).replace(f'{place}=anything', place)}") from error
     asked = direction_of(studio, f"{song}|graph", pins=pins)
-    graph, clip_ids = tables.to_motion_graph(lake.table("motion_graph_node"), lake.table("motion_graph_edge"))
+    graph, clip_ids = to_motion_graph(lake.table("motion_graph_node"), lake.table("motion_graph_edge"))
     clips = read_clips(StoredTable(lake, "clip", lake.keys("clip")))
     poses = poses_of(StoredTable(lake, "canonical_pose", lake.keys("canonical_pose")), studio.settings())
     known = catalogue(graph, clip_ids, clips, asked.allow, poses=poses)

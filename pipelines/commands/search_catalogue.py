@@ -18,7 +18,7 @@ from assets.formats import bvh, motion_index
 from assets.formats.errors import FormatError
 from assets.formats.file_names import file_name
 from assets.formats.settings import read_settings
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables import search as search_tables
 from kernels.search.encoder import Encoder, from_arrays
 from kernels.search.windows import windows
@@ -153,7 +153,7 @@ class Catalogue:
         """
         path = self.lake / "canonical_pose" / f"{file_name(session)}.parquet"
         table = pq.read_table(path, columns=["time_s", "position_xyz_m"], filters=pc.field("clip_id") == clip_id)
-        return tables.to_array(table["position_xyz_m"]), tables.frame_rate_hz(table)
+        return pack.to_array(table["position_xyz_m"]), pack.frame_rate_hz(table)
 
     def _embed(self, text: str, clip_id: str, poses: tuple[Float, float], start_s: float, end_s: float) -> Motion:
         settings = read_settings(self.root / "odori.toml").search

@@ -15,7 +15,7 @@ from upath import UPath
 from assets.formats import beside
 from assets.formats.file_names import WINDOWS, file_name, key_of, name_anew
 from assets.stamps import Stamp
-from assets.tables import pack as tables
+from assets.tables import pack
 from pipelines.studio.files import LakeError, write_beside
 from schemas.catalog import TABLES
 
@@ -108,7 +108,7 @@ class Lake:
 
 def _write_parquet(table: pa.Table, file: IO[bytes]) -> None:
     is_framewise = TABLES[table.schema.metadata[b"table"].decode()].key == ("clip_id", "frame_index")
-    parts = list(tables.by_clip(table).values()) if is_framewise and table.num_rows else [table]
+    parts = list(pack.by_clip(table).values()) if is_framewise and table.num_rows else [table]
     if len(parts) > LONGEST_ROW_GROUPS:
         parts = [table]
     with pq.ParquetWriter(

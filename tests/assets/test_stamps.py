@@ -5,7 +5,8 @@ import pyarrow as pa
 
 from assets import stamps
 from assets.stamps import ClipStamp, Stamp, content_version
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.motion import from_motion_beat, from_pose, from_skeleton
 from kernels.motion.beats import motion_beats
 from kernels.synthetic.dancer import place, take
 from schemas.motion import MOTION_BEAT
@@ -30,7 +31,7 @@ class Kept:
 
 def beats_of(clip_id):
     label = clip_id.rsplit("-", 1)[-1]
-    return tables.from_motion_beat(clip_id, motion_beats(place(take(label, n_beats=6)), 30.0), 30.0)
+    return from_motion_beat(clip_id, motion_beats(place(take(label, n_beats=6)), 30.0), 30.0)
 
 
 def make(kept, made_from):
@@ -63,8 +64,8 @@ def test_clips_come_go_and_change_places():
     make(kept, {"s-step": "1", "s-wave": "1"})
     part, asked = make(kept, {"s-wave": "1", "s-kick": "1"})
     assert asked == ["s-kick"]
-    assert list(tables.by_clip(part.table)) == ["s-wave", "s-kick"]
-    assert part.table.equals(tables.concat(MOTION_BEAT, [beats_of("s-wave"), beats_of("s-kick")]))
+    assert list(pack.by_clip(part.table)) == ["s-wave", "s-kick"]
+    assert part.table.equals(pack.concat(MOTION_BEAT, [beats_of("s-wave"), beats_of("s-kick")]))
 
 
 def test_a_clip_of_no_rows_is_carried_too():
@@ -120,12 +121,12 @@ def test_content_does_not_depend_on_the_layout_in_memory(tmp_path):
 
     clips = {name: take(name, n_beats=4).clip for name in ("step", "wave")}
     for make in (
-        lambda name, clip: tables.from_pose(name, clip),
-        lambda name, clip: tables.from_skeleton(name, clip.skeleton, map_joints(clip.skeleton)),
+        lambda name, clip: from_pose(name, clip),
+        lambda name, clip: from_skeleton(name, clip.skeleton, map_joints(clip.skeleton)),
     ):
         fresh = {name: make(name, clip) for name, clip in clips.items()}
         pq.write_table(pa.concat_tables(list(fresh.values())), tmp_path / "both.parquet")
-        again = tables.by_clip(pq.read_table(tmp_path / "both.parquet"))
+        again = pack.by_clip(pq.read_table(tmp_path / "both.parquet"))
         for name, table in fresh.items():
             assert content_version(again[name]) == content_version(table)
         assert content_version(fresh["step"]) != content_version(fresh["wave"])

@@ -11,7 +11,7 @@ from assets.formats import audio, bvh
 from assets.formats.audio import Audio
 from assets.formats.errors import FormatError
 from assets.tables import matching as matching_tables
-from assets.tables import pack as tables
+from assets.tables import pack
 from kernels.matching.pieces import motion_under
 from kernels.matching.score import reference_matches, similarity
 from kernels.synthetic.dancer import take
@@ -39,7 +39,7 @@ def studio(matched, tmp_path):
 
 def test_features_are_120_a_second_float32_and_scaled(matched):
     table = lake(matched).table("motion_feature", "ayame")
-    for rows in tables.by_clip(table).values():
+    for rows in pack.by_clip(table).values():
         np.testing.assert_allclose(np.diff(rows["time_s"]), 1 / 120)
         for name in ("rhythm", "intensity"):
             values = rows[name].to_numpy()
@@ -226,7 +226,7 @@ def test_a_clip_of_one_frame_and_one_that_stands_still_do_no_harm(studio):
         (studio / "clips" / "kaede" / f"{name}.bvh").write_bytes(bvh.format(made))
     outcome = dance(studio)
     assert outcome.facts["method"] == "matching", outcome.troubles
-    features = tables.by_clip(lake(studio).table("motion_feature", "kaede"))
+    features = pack.by_clip(lake(studio).table("motion_feature", "kaede"))
     assert features["kaede-one"].num_rows == 1
     assert not features["kaede-still"]["rhythm"].to_numpy().any()
 

@@ -4,8 +4,9 @@ import numpy as np
 import polars as pl
 import pyarrow.parquet as pq
 
-from assets.tables import pack as tables
-from kernels.skeleton.canonical import mirror
+from assets.tables import pack
+from assets.tables.motion import to_canonical_pose
+from kernels.skeleton.canonical import JOINTS, mirror
 from pipelines.commands.dance import dance_songs
 from pipelines.commands.propose import propose_pins
 from pipelines.commands.why import explain_dance
@@ -35,12 +36,12 @@ def test_a_mirrored_catalogue_is_twice_as_large_and_its_dance_says_what_is_mirro
     assert told.facts["is_mirrored"]
     here = alone.filter(pl.col("frame_index") == frame).row(0, named=True)
     session = here["clip_id"].partition("-")[0]
-    poses = tables.by_clip(rows(studio, "canonical_pose", session))[here["clip_id"]]
-    moved = tables.to_canonical_pose(poses)
+    poses = pack.by_clip(rows(studio, "canonical_pose", session))[here["clip_id"]]
+    moved = to_canonical_pose(poses)
     _, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
     at = min(round(here["clip_time_s"] * moved.frame_rate_hz), len(turned) - 1)
-    shown = tables.to_array(rows(studio, "dance_pose", "beat|graph")["rotation_wxyz"])[frame]
-    arms = [tables.JOINTS.index(f"{side}UpperArm") for side in ("left", "right")]
+    shown = pack.to_array(rows(studio, "dance_pose", "beat|graph")["rotation_wxyz"])[frame]
+    arms = [JOINTS.index(f"{side}UpperArm") for side in ("left", "right")]
     unlike = [np.abs(np.abs((shown[arms] * q[at][arms]).sum(-1)) - 1).max() for q in (turned, moved.rotation_wxyz)]
     assert unlike[0] < 2e-3
 

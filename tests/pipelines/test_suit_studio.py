@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from assets.formats import bvh, suit
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.motion import to_canonical_pose
 from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.synthetic.dancer import take
@@ -84,15 +85,15 @@ def test_calibration_goes_with_the_clip_that_was_read(built_suit):
 
 def test_the_dancer_in_the_suit_dances_as_the_dancer_without(built_suit, danced):
     """Canonical poses against the motion behind the recording, both seen from where the body faces."""
-    clips = tables.by_clip(stored(built_suit[0], "canonical_pose"))
-    found = tables.to_canonical_pose(clips["suit-medley"])
+    clips = pack.by_clip(stored(built_suit[0], "canonical_pose"))
+    found = to_canonical_pose(clips["suit-medley"])
     place, world = kinematics.place(danced.clip)
     assert found.position_xyz_m.shape == place.shape
     seen = _facing(found.position_xyz_m, found.rotation_wxyz[:, 0])
     truth = _facing(place, world[:, 0])
     away = np.linalg.norm(seen - truth, axis=-1)
     assert np.sqrt(np.mean(away**2)) < 0.08
-    beats = tables.by_clip(stored(built_suit[0], "motion_beat"))["suit-medley"]
+    beats = pack.by_clip(stored(built_suit[0], "motion_beat"))["suit-medley"]
     assert beats["interval_s"][0].as_py() == pytest.approx(0.52, rel=0.02)
 
 

@@ -11,7 +11,7 @@ from assets.dancing.pose_pins import Poses, moment_of, shown_pose, to_pose_pins
 from assets.dancing.wishes import DirectionError
 from assets.reading.songs import PlayedSong
 from assets.stamps import ClipStamp, Stamp
-from assets.tables import pack as tables
+from assets.tables.motion import CanonicalClip, from_canonical_pose
 from kernels.graph.costs import PathCosts
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.path import STEPS, find_path
@@ -61,7 +61,7 @@ CLIPS = {"day-a": (1.2, 0.31), "day-b": (1.2, 0.23), "day-c": (0.02, 0.5)}
 def poses():
     rows = {}
     for name, how in CLIPS.items():
-        rows[name] = tables.from_canonical_pose(name, RATE_HZ, tables.CanonicalClip(name, RATE_HZ, *swinging(*how)))
+        rows[name] = from_canonical_pose(name, RATE_HZ, CanonicalClip(name, RATE_HZ, *swinging(*how)))
     return Poses(InMemory(rows))
 
 
@@ -204,10 +204,10 @@ def test_told_of_a_finished_dance(graph, poses, clip, at_s, is_kept):
             "is_kept": [True] * 20,
         }
     )
-    shown = tables.CanonicalClip("dance", RATE_HZ, *swinging(*CLIPS[clip]))
+    shown = CanonicalClip("dance", RATE_HZ, *swinging(*CLIPS[clip]))
     shift = round((at_s - 2.0) * RATE_HZ)
     frame = np.clip(np.arange(N_FRAMES) + shift, 0, N_FRAMES - 1)
-    dance = tables.CanonicalClip(
+    dance = CanonicalClip(
         "dance", RATE_HZ, shown.root_xyz_m[frame], shown.rotation_wxyz[frame], shown.position_xyz_m[frame]
     )
     wish = parse_pin("2=pose:day-a@1.7")

@@ -4,7 +4,7 @@ import pytest
 
 from assets.plots import calibration as calibration_plots
 from assets.sources.calibration import calibrate_recording
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables.calibration import from_calibration
 from kernels.synthetic.suit import made_up
 from schemas.calibration import CALIBRATION
@@ -33,7 +33,5 @@ def test_calibrations_of_a_session(joints):
     assert shown.startswith("- clips/s/a.csv: doubtful")
     assert "### s-take" in shown
     assert calibration_plots.session(CALIBRATION.empty(), []) == "no suit recordings"
-    many = tables.concat(
-        CALIBRATION, [joints.set_column(0, joints.schema.field(0), [[f"s-{k}"] * 16]) for k in range(8)]
-    )
+    many = pack.concat(CALIBRATION, [joints.set_column(0, joints.schema.field(0), [[f"s-{k}"] * 16]) for k in range(8)])
     assert "and 2 more recordings" in calibration_plots.session(many, [])

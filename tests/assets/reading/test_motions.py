@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 
 from assets.reading.motions import cut
-from assets.tables import pack as tables
+from assets.tables.motion import from_canonical_pose
 from kernels.skeleton import kinematics
 from kernels.skeleton.contacts import FootContacts
 from kernels.skeleton.retarget import CanonicalMotion
@@ -17,7 +17,7 @@ def rows(clip):
     position, _ = kinematics.place(clip)
     still = FootContacts(*(np.zeros(0) for _ in fields(FootContacts)))
     motion = CanonicalMotion(clip.root_xyz_m, clip.rotation_wxyz, position, 1.0, still)
-    return tables.from_canonical_pose("a-x", clip.frame_rate_hz, motion)
+    return from_canonical_pose("a-x", clip.frame_rate_hz, motion)
 
 
 def test_motions_of_a_performance():

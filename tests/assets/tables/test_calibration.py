@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assets.sources.calibration import calibrate_recording
-from assets.tables import pack as tables
+from assets.tables import pack
 from assets.tables.calibration import N_SPANS, from_calibration, to_curves
 from kernels import rotation
 from kernels.calibration.records import JOINTS, SENSORS
@@ -27,12 +27,12 @@ def test_one_row_a_joint(found, table):
     assert table["joint_name"].to_pylist() == list(JOINTS)
     assert table["joint_index"].to_pylist() == list(range(1, 17))
     np.testing.assert_allclose(
-        tables.to_array(table["in_parent_sensor_xyz_m"]), found.calibration.in_parent_sensor_m, atol=1e-6
+        pack.to_array(table["in_parent_sensor_xyz_m"]), found.calibration.in_parent_sensor_m, atol=1e-6
     )
     np.testing.assert_allclose(
-        tables.to_numbers(table["length_m"]), [j.length_m for j in found.calibration.joints], atol=1e-6
+        pack.to_numbers(table["length_m"]), [j.length_m for j in found.calibration.joints], atol=1e-6
     )
-    assert (tables.to_numbers(table["gap_after_m"]) < 1e-6).all()
+    assert (pack.to_numbers(table["gap_after_m"]) < 1e-6).all()
     assert table["confidence_label"].to_pylist() == [joint.confidence for joint in found.calibration.joints]
     assert table["advice"].to_pylist() == [joint.advice or None for joint in found.calibration.joints]
 
@@ -40,7 +40,7 @@ def test_one_row_a_joint(found, table):
 def test_sensors_on_the_stored_bones_are_where_they_were(found, table):
     """A bone of the clip and the sensor's place on it from the table give the sensor's place in the world."""
     place, turned = kinematics.place(found.clip)
-    sensor_m, sensor = tables.to_array(table["sensor_xyz_m"]), tables.to_array(table["sensor_wxyz"])
+    sensor_m, sensor = pack.to_array(table["sensor_xyz_m"]), pack.to_array(table["sensor_wxyz"])
     cleaned, up = found.cleaned.recording, found.gauge.up_wxyz
     for k in (3, 8, 16):
         seen = place[:, k] + rotation.apply(turned[:, k], sensor_m[k - 1])
@@ -52,9 +52,7 @@ def test_sensors_on_the_stored_bones_are_where_they_were(found, table):
 
 
 def test_offsets_are_the_skeletons(found, table):
-    np.testing.assert_allclose(
-        tables.to_array(table["offset_xyz_m"]), found.clip.skeleton.offset_xyz_m[1:17], atol=1e-6
-    )
+    np.testing.assert_allclose(pack.to_array(table["offset_xyz_m"]), found.clip.skeleton.offset_xyz_m[1:17], atol=1e-6)
 
 
 def test_curves_keep_the_mean_square(found, table):

@@ -7,7 +7,8 @@ import pytest
 from upath import UPath
 
 from assets.stamps import ClipStamp, Stamp
-from assets.tables import pack as tables
+from assets.tables import pack
+from assets.tables.motion import from_motion_beat
 from kernels.motion.beats import motion_beats
 from kernels.synthetic.dancer import place, take
 from pipelines.studio.files import LakeError, why, write_beside
@@ -24,9 +25,9 @@ def lake(tmp_path):
 
 @pytest.fixture(scope="module")
 def beats():
-    return tables.concat(
+    return pack.concat(
         MOTION_BEAT,
-        [tables.from_motion_beat(f"s-{n}", motion_beats(place(take(n)), 30.0), 30.0) for n in ("step", "wave")],
+        [from_motion_beat(f"s-{n}", motion_beats(place(take(n)), 30.0), 30.0) for n in ("step", "wave")],
     )
 
 
