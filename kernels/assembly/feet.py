@@ -27,9 +27,10 @@ from kernels.types import Choreography, Clip, Float
 
 Bool = NDArray[np.bool_]
 UP = np.array([0.0, 1.0, 0.0])
+"""By convention."""
 
 SAY = 0.25
-"""Share of a pose above which the partner of a blend, too, must have its foot planted."""
+"""Share of a pose above which the partner of a blend, too, must have its foot planted. Chosen by hand."""
 
 
 @dataclass(frozen=True)

@@ -231,6 +231,7 @@ def warp_measures(steps: Choreography) -> list[Measure]:
 
 
 _SLACK = 1e-6
+"""Of ratios that are stored as float32. Chosen by hand, some roundings wide."""
 
 
 def _crossing_s(dance: Dance, step: int, clip_s: float) -> float | None:

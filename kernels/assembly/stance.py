@@ -14,8 +14,11 @@ from kernels.skeleton.contacts import FootContacts, find_contacts
 from kernels.types import Clip, Float
 
 HEADING_WEIGHT = 0.05
-"""Of two points 0.3 m before and behind the root against one planted point: what keeps a body facing where it faced."""
+"""Of two points `_ARM_M` before and behind the root against one planted point: what keeps a body facing where it faced.
+Chosen by hand, faint beside the feet."""
+
 _ARM_M = 0.3
+"""Chosen by hand, about the length of a step."""
 
 
 def clip_contacts(clip: Clip, position_xyz_m: Float) -> FootContacts:

@@ -18,14 +18,39 @@ from kernels.calibration.pairs import find_swap, pair_costs, pair_residuals, spa
 from kernels.calibration.records import JOINTS, PARENT, SENSORS, Cleaned, Finding, Severity
 from kernels.types import Float
 
-_MOST_FRAMES, _LEAST_FRAMES = 2000, 200
-_ENOUGH_FRAMES, _GOOD_FRAMES = 240, 960
-_SWAP_RATIO = 0.8  # one exchange: at most 0.61 where labels are exchanged, at least 1.6 where they are right
+_MOST_FRAMES = 2000
+_LEAST_FRAMES = 200
+"""Frames that are judged at most, for speed, and frames with every sensor good below which all are judged. Chosen by
+hand."""
+
+_ENOUGH_FRAMES = 240
+_GOOD_FRAMES = 960
+"""Frames of a joint. Measured on made-up recordings with 2 mm and 1 degree of noise: the median error of bone lengths
+is 2.1 mm with 240 frames and 0.7 mm with 960, and with 120 some are off by any amount."""
+
+_SWAP_RATIO = 0.8
+"""Residual with two labels exchanged over that as given. Measured on made-up recordings: at most 0.61 where labels are
+exchanged, at least 1.6 where they are right."""
+
 _MOST_SWAPS = 4
-_TREE_RATIO, _TREE_M = 3.0, 0.010
+"""Pairs of labels exchanged at the same time. Chosen by hand: with more, the sides are likelier to be exchanged."""
+
+_TREE_RATIO = 3.0
+_TREE_M = 0.010
+"""How many times better another edge must fit, and how far the given one must be off. Chosen so that soft tissue of a
+good made-up recording, up to 12 mm, gives no warning."""
+
 _BETTER_RATIO = 0.5
+"""Residual of rotations read another way over that as given. Measured on made-up recordings: right readings leave 3 to
+11 mm, wrong ones 175 to 305 mm."""
+
 _SIDE = 0.3
-_LOOSE_M, _STRANGE_M = 0.030, 0.060
+"""Mean cosine of hips and shoulders, and share of the bend of the knees, below minus which sides are exchanged.
+Measured on made-up recordings: 0.87 to 0.98 where labels are right, the same negative where they are exchanged."""
+
+_LOOSE_M = 0.030
+_STRANGE_M = 0.060
+"""Robust distance of a joint's two ends, an axis. Chosen by hand above what soft tissue does."""
 
 ORDERS: dict[str, Callable[[Float], Float]] = {
     "inverted (world to sensor)": rotation.inv,

@@ -11,7 +11,9 @@ from kernels.calibration.joints import PairSolution, solve_joints
 from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, JointEstimate
 from kernels.types import Float
 
-_DECIMALS = 8  # of metres: a thousandth of the smallest error on a recording without noise
+_DECIMALS = 8
+"""Of metres. Chosen between the last bits of linear algebra, measured on three of its kernels as 4e-14 m at most, and
+the smallest error on a recording without noise, a thousand times as large."""
 
 
 def calibrate(cleaned: Cleaned, *, has_adjustment: bool = True) -> Calibration:

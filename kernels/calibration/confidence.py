@@ -7,8 +7,14 @@ import numpy as np
 from kernels.calibration.body_faults import move_to_repeat
 from kernels.calibration.records import Confidence
 
-_LOW_DEG, _MEDIUM_DEG = 4.0, 6.0
-_LOW_M, _MEDIUM_M = 0.008, 0.004
+_LOW_DEG = 4.0
+_MEDIUM_DEG = 6.0
+"""Movement about the weakest axis. Chosen with `_LOW_M` and `_MEDIUM_M` by hand."""
+
+_LOW_M = 0.008
+_MEDIUM_M = 0.004
+"""Robust residual. Measured on six made-up recordings with 5 mm of soft tissue: of joints rated low nine in ten are
+within 32 mm, of medium ones within 12 mm, of high ones within 8.4 mm."""
 
 
 def rate(*, rank: int, least_motion_rad: float, residual_sigma_m: float) -> Confidence:

@@ -15,9 +15,18 @@ from kernels.calibration.gaps import aligned, fill
 from kernels.calibration.records import Bools
 from kernels.types import Float
 
-_LEAST_M, _LEAST_QUATERNION = 0.015, 0.05
-_TURN_M_PER_S2, _TURN_RAD_PER_S2 = 30.0, 100.0
+_LEAST_M = 0.015
+_LEAST_QUATERNION = 0.05
+"""Departures that are never outliers; of the quaternion the length of the difference. Chosen by hand above the noise of
+suits, far below the 150 mm and 20 degrees of made-up outliers."""
+
+_TURN_M_PER_S2 = 30.0
+_TURN_RAD_PER_S2 = 100.0
+"""What a limb does at a fast turn. Chosen by hand for hands that move at 3 Hz, on made-up recordings."""
+
 _MOST_BAD = 5
+"""Of the eight entries around one. Chosen as the majority."""
+
 # Exchanges of a network after which the fifth of nine is their median [Devillard1998].
 _NETWORK = "12 45 78 01 34 67 12 45 78 03 58 47 36 14 25 47 42 64 42"  # pairs of places, smaller to the first
 

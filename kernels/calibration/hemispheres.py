@@ -12,11 +12,22 @@ from kernels.calibration.records import Bools, Finding
 from kernels.types import Float
 
 _WINDOW = 5
+"""Usable frames before and after a jump whose medians are compared. Chosen by hand: shorter visits are outliers."""
+
 _LEAST_JUMP_M = 0.2
+"""Chosen by hand above what a limb moves in a frame."""
+
 _MIRRORED = 0.2
+"""How far from opposite, as a share of the jump, two places may be. Chosen by hand."""
+
 _TELLING = 0.8
+"""Share of the one half's distance from the other sensors that the right half has at most. Chosen by hand."""
+
 _WHOLLY = 0.5
+"""The same for a sensor that never jumps, so that good recordings stay as they are. Chosen by hand."""
+
 _GLANCES = 400
+"""Frames at which the middle of a body is taken. Chosen for speed, by hand."""
 
 
 def undo_hemispheres(

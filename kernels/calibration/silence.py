@@ -7,8 +7,12 @@ import numpy as np
 from kernels.calibration.records import Bools, Finding, Recording
 from kernels.types import Float
 
-_LEAST_S, _LEAST_FRAMES = 0.25, 5
+_LEAST_S = 0.25
+_LEAST_FRAMES = 5
+"""How long a reading is repeated. Chosen by hand: a sensor that noise never changes is not read."""
+
 _MOVED_M = 0.05
+"""Median of how far the other sensors move meanwhile. Chosen by hand, so that nobody who stands still is accused."""
 _CURE = "they count as not heard; check its cable and its distance from the source"
 
 

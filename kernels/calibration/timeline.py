@@ -16,11 +16,21 @@ from kernels import rotation
 from kernels.types import Float, Int
 
 _COMMON_HZ = (20, 24, 25, 30, 40, 48, 50, 60, 75, 80, 90, 100, 120, 144, 150, 160, 180, 200, 240)
+"""Rates that trackers, cameras and screens have, by convention."""
+
 _LONGEST_PAUSE_S = 5.0
-_LEAST_STEP_S, _MOST_STEP_S = 0.001, 0.2
+"""Chosen by hand: what is further apart is two takes."""
+
+_LEAST_STEP_S = 0.001
+_MOST_STEP_S = 0.2
+"""Steps of a recording of a body. Chosen by hand: 5 to 1000 frames a second."""
+
 _FINER = {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9}
-# Share of a step: times this near to the grid are on it; steps this short are a burst.
-_ON_GRID, _BURST = 0.25, 0.25
+"""In seconds, by definition."""
+
+_ON_GRID = 0.25
+_BURST = 0.25
+"""Share of a step: times this near to the grid are on it; steps this short are a burst. Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)
