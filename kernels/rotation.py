@@ -15,6 +15,7 @@ Float = NDArray[np.float64]
 Floats = NDArray[np.float64] | NDArray[np.float32]
 
 IDENTITY: Float = np.array([1.0, 0.0, 0.0, 0.0])
+"""No turn, w first, by definition."""
 
 
 def _join(*component: Float) -> Float:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 EASY_WARP = (0.90, 1.10)
-"""Ratios that nobody notices; wanted of 95 steps in a hundred. Agreed for the product, not measured."""
+"""Ratios that are to go unnoticed; wanted of 95 steps in a hundred. Agreed for the product, not measured."""
 
 HARD_WARP = (0.80, 1.25)
 """Ratios no step may leave. Agreed for the product."""
 
 STEP = 1.1
-"""The ratio whose price is 1."""
+"""The ratio whose price is 1, by definition: the easy bound."""
 
 
 def stretch_price(ratio: NDArray[np.floating] | float) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from schemas.keys import alternative_number
 from schemas.pins import PinWish, parse_pin
 
 SOFT_WISH = 1.0
-"""Price of a beat that a soft wish would have otherwise: that of [Xu2015], about that of a seam."""
+"""Price of a beat that a soft wish would have otherwise, about that of a seam: equation 24 of [Xu2015]."""
 
 
 @dataclass(frozen=True)

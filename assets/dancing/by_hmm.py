@@ -39,15 +39,19 @@ from kernels.types import Float
 from schemas.settings import Settings
 
 LARGEST_POOL = 8_000
-"""Motions a dance is chosen from: pinned clips first, then performances, then clips in order of their names."""
+"""Motions a dance is chosen from: pinned clips first, then performances, then clips in order of their names. Chosen for
+memory and time, by hand."""
 
 LONGEST_SPAN = 8
+"""Parts of beats that a motion may last. Chosen for time, by hand."""
+
 LEAST_LOG = -12.0
-"""Log probability of a length in which a recording can be danced, however seldom motions of its kind are so long."""
+"""Log probability of a length in which a recording can be danced, however seldom motions of its kind are so long.
+Chosen by hand, far below any that is counted."""
 
 UNSURE = 0.5
-"""Where nobody danced to a song, motions cost so much more or less at random, drawn by the seed: else the one cheapest
-loop would be danced to every song."""
+"""Where nobody danced to a song, motions cost so much more at random, in the mean, drawn by the seed: else the one
+cheapest loop would be danced to every song. Chosen by hand: half a seam."""
 
 
 @dataclass(frozen=True, eq=False)

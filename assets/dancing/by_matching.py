@@ -25,9 +25,11 @@ from kernels.types import Choreography, Float
 from schemas.settings import Settings
 
 APART_S = 0.1
-"""How far apart moments of one clip are that pass for neighbours: a quarter of the usual blend."""
+"""How far apart moments of one clip are that pass for neighbours. Tuned on real clips: at 0.017 s only a clip itself
+connects, at 0.2 s over half of all pairs do, with feet that visibly slide."""
 
-WARP_COST, MARGIN_COST = 0.1, 0.5
+MARGIN_COST = 0.5
+"""Price of a blend half of which would lie past the clip's end. Chosen by hand."""
 
 
 def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, settings: Settings) -> Danced:

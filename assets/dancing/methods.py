@@ -16,6 +16,8 @@ METHODS: dict[str, Method] = {name: import_module(f"assets.dancing.by_{name}").M
 
 USUAL = settings.METHODS[0]
 MOST_ALTERNATIVES = 5
+"""Dances of a song by one method, the best among them. Chosen by hand."""
+
 ALTERNATIVES = tuple(
     f"{method.name}_{number}"
     for method in METHODS.values()

@@ -22,7 +22,8 @@ from schemas.pins import PinWish, parse_pin
 from schemas.settings import PathSettings, Settings
 
 MOST_PROGRAMS = 100
-"""Names of a kind that are priced over several intervals, those of the least bound first; the rest are told as such."""
+"""Names of a kind that are priced over several intervals, those of the least bound first; the rest are told as such.
+Chosen for time, by hand."""
 
 KINDS = ("label", "style", "clip")
 _PREFIX = {"label": "", "style": "style:", "clip": "clip:"}

@@ -44,7 +44,7 @@ _PRIOR_SHARE = 0.02
 joint 90 mm off instead of 65, eight times the weight is worse everywhere."""
 
 _FIXED_M = 1e-5
-"""Deviation of what is to stay where it is. Chosen far below any error, and far enough above rounding."""
+"""Deviation of what is to stay where it is. Chosen below any error, and far enough above rounding."""
 
 _LOOSE = 1e-4
 """Share of the prior that noise alone leaves. Chosen to keep the equations from being singular."""

@@ -16,6 +16,8 @@ _N_SLOPE = 9
 """Frames a slope is taken from. Chosen by hand: it carries 3 mm of noise across 20 lost frames at 2 mm of noise."""
 
 _AT = np.arange(_N_SLOPE) - 4.0
+"""Frames from the middle one, by definition."""
+
 # Weights of nine samples whose sum is the slope of their parabola at the last one, from their sums of squares and of
 # fourth powers, 60 and 708, by definition of least squares: what a linear algebra library would find has last bits of
 # the processor's own.

@@ -20,7 +20,8 @@ from kernels.types import Choreography, Float, Int, MotionGraph
 Mask = NDArray[np.bool_]
 
 STEPS: tuple[tuple[int, int], ...] = ((1, 1), (2, 1), (1, 2))
-"""Kinds of step, motion beats over music beats: beat on beat, double-time, half-time."""
+"""Kinds of step, motion beats over music beats: beat on beat, double-time, half-time. By convention of dancers; the
+first alone is in [Xu2015]."""
 
 
 class InfeasiblePathError(ValueError):

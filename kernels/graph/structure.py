@@ -12,7 +12,7 @@ from kernels.music.repeats import Repeat
 from kernels.types import Int
 
 FREE_BEATS = 2
-"""Intervals at both ends of a repeated part that stay free, for the way into it and out of it."""
+"""Intervals at both ends of a repeated part that stay free, for the way into it and out of it. Chosen by hand."""
 
 
 def node_of_interval(path: Path) -> Int:

@@ -44,7 +44,7 @@ def identify(state: Int, models: Sequence[Model]) -> int:
 
 
 WINDOW_S, HOP_S = 2.0, 1.0
-"""Stretches of a dance that are looked at, seconds: a few motions each."""
+"""Stretches of a dance that are looked at, seconds: a few motions each. Chosen by hand."""
 
 
 def pose_windows(position_xyz_m: Float, frame_rate_hz: float) -> Float:

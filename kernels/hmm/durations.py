@@ -17,12 +17,15 @@ LEAST_WARP, MOST_WARP = HARD_WARP
 """Song time over clip time of a motion: never outside."""
 
 HARD_LOG = -6.0
-"""Beyond the easy bounds a motion counts so much less, natural log: danced only where nothing else fits."""
+"""Beyond the easy bounds a motion counts so much less, natural log: danced only where nothing else fits. Chosen by
+hand."""
 
 WIDTH = 0.05
-"""Standard deviation of the bump that each motion's length makes, in natural log: five per cent."""
+"""Standard deviation of the bump that each motion's length makes, in natural log: five per cent. Chosen by hand, half
+of the easy bounds."""
 
 MOST_PARTS = 4
+"""Parts of a beat: motions are no shorter than a sixteenth note. Chosen by hand."""
 
 
 def parts_per_beat(beat_interval_s: float, motion_s: Float) -> int:

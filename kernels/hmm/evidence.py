@@ -16,11 +16,15 @@ from kernels.hmm.model import Model, Performed, Smoothing, folds, learn, without
 from kernels.types import Float, Int
 
 N_SHUFFLES = 199
+"""By convention one less than a round number: the least chance there is, counting the music itself, is 0.005."""
+
 BLOCK = 8
-"""Motions of one stretch: what changes more slowly (a verse, a chorus) is kept together when music is shuffled."""
+"""Motions of one stretch: what changes more slowly (a verse, a chorus) is kept together when music is shuffled. Chosen
+by hand."""
 
 SURE_P, LEAST_GAIN = 0.01, 0.01
-"""Chance below which, and natural log units a motion from which, music is said to add something."""
+"""Chance below which, by convention, and natural log units a motion from which, chosen by hand, music is said to add
+something."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,11 @@ from kernels.hmm.seams import Ends, seam_cost
 from kernels.types import Float, Int
 
 N_NEAREST, N_EACH_STATE = 24, 48
-"""Links of each motion: to so many whose seams are cheapest, and to so many shared evenly among all basic motions."""
+"""Links of each motion: to so many whose seams are cheapest, and to so many shared evenly among all basic motions.
+Chosen by hand; five times as many were tried on three songs of real clips and gave the same dances."""
 
 BLOCK = 256
-"""Motions whose seams to all others are priced at a time."""
+"""Motions whose seams to all others are priced at a time. Chosen for memory, by hand; changes no link."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,13 @@ import numpy as np
 from kernels.types import Float, Int
 
 ALPHAS: tuple[float, ...] = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+"""Counts added that are tried: by convention two a decade, around the one of Laplace."""
+
 N_FOLDS = 5
+"""Parts of the performances, each held out once, by convention."""
+
 SETTLING_STEPS = 256
+"""Steps over which the share of each motion is averaged. Chosen by hand, far more than a model needs to forget."""
 
 
 @dataclass(frozen=True, eq=False)

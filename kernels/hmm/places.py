@@ -19,10 +19,11 @@ from kernels.hmm.viterbi import InfeasibleSpansError
 from kernels.types import Float, Int
 
 MISSED_BEAT = 2.0
-"""Price of a beat on which the body does not visibly stop."""
+"""Price of a beat on which the body does not visibly stop. Chosen as by the motion graph (`missed_beat` of its
+costs)."""
 
 CROWDED = 6.0
-"""Price of a seam at the very start or end of the song: its blend has no room."""
+"""Price of a seam at the very start or end of the song: its blend has no room. Chosen by hand: several seams."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,26 +13,32 @@ from threadpoolctl import threadpool_limits
 from kernels.types import Float, Int
 
 SIZES: tuple[int, ...] = (2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14, 16, 20, 24, 32, 48, 64)
-"""Numbers of states that are tried."""
+"""Numbers of states that are tried. Chosen by hand: each for few, in steps of a third to a half for many."""
 
 FEWEST_EACH = 12
-"""No more states are tried than leave so many motions to each on average: fewer cannot be counted."""
+"""No more states are tried than leave so many motions to each on average: fewer cannot be counted. Chosen by hand."""
 
 CLEAR, ALIKE_RATIO = 0.7, 0.97
-"""Clearness from which motions fall into kinds by themselves: then the clearest number of states is taken, of numbers
-almost as clear (at least so much of it) the largest."""
+"""Clearness (the simplified silhouette of [Hruschka2004]) from which motions fall into kinds by themselves: then the
+clearest number of states is taken, of numbers almost as clear (at least so much of it) the largest. Chosen by hand;
+made-up performers of 8 states are found so."""
 
 CLEAR_RATIO = 0.7
 """Else, as with most dancers, the largest number of states is chosen that is at least so clear as the clearest: finer
-states follow the dancer more closely, and cutting across no kinds they lose nothing."""
+states follow the dancer more closely, and cutting across no kinds they lose nothing. The share is chosen by hand."""
 
 MOST_DIMENSIONS = 24
+"""Principal components that motions are clustered by. Chosen for speed, by hand."""
+
 STARTS, MOST_ROUNDS = 8, 100
+"""Of k-means: the best of so many starts is taken, each of so many rounds at most. Chosen by hand."""
+
 MOST_TRIED = 1500
-"""Numbers of states are tried on so many motions, taken evenly from all."""
+"""Numbers of states are tried on so many motions, taken evenly from all. Chosen for speed, by hand."""
 
 REACH = 1.5
-"""A motion that was not clustered belongs to a state within so many times the reach of its own motions."""
+"""A motion that was not clustered belongs to a state within so many times the reach of its own motions. Chosen by
+hand."""
 
 
 @dataclass(frozen=True, eq=False)

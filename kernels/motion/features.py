@@ -25,17 +25,19 @@ from kernels.motion.velocity import usable_frames
 from kernels.types import Float, Int
 
 FEATURE_RATE_HZ = 120.0
-"""Values a second of every feature series."""
+"""Values a second of every feature series, as in [Yagi2009]."""
 
 SMOOTHING_S = 0.04
-"""Standard deviation of the Gaussian over weight effort: what is faster is marker noise."""
+"""Standard deviation of the Gaussian over weight effort: what is faster is marker noise. Chosen by hand."""
 
 LEAST_DROP_RATIO, LEAST_DROP_RAD_PER_S = 0.08, 0.2
 """A minimum is a stop where effort drops by so much of the clip's 99th percentile, and by so much at all: a tenth of
-what a dance moves with, less is not seen."""
+what a dance moves with, less is not seen. Chosen by hand; without the second, clips of people who stand and wave were
+scaled up to full rhythm."""
 
 LEAST_EFFORT_RAD_PER_S = 0.02
-"""A clip whose 99th percentile is lower stands still: its rhythm and intensity are 0, not its noise blown up."""
+"""A clip whose 99th percentile is lower stands still: its rhythm and intensity are 0, not its noise blown up. Chosen by
+hand."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -167,7 +167,8 @@ def jerk(position_m: Float, frame_rate_hz: float) -> Float:
 
 
 SEEN_STEP_S = 1.0 / 30.0
-"""Time of one difference where jerk is taken as a viewer sees it, whatever rate a clip was recorded at."""
+"""Time of one difference where jerk is taken as a viewer sees it, whatever rate a clip was recorded at. Chosen as a
+frame of the usual stage."""
 
 
 def jerk_around(
