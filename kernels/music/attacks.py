@@ -13,15 +13,32 @@ Float = NDArray[np.float64]
 STEP_S = 0.002
 WINDOW_S = 0.012
 N_BANDS = 24
+"""Windows an attack is looked for with, and bands of their spectrum. Chosen by hand."""
+
 REACH_S = 0.040
+"""How far a beat may move to its attack. Chosen by hand."""
+
 WIDE_REACH_S, NEAR_S, ELSEWHERE_RATIO = 0.080, 0.030, 3.0
+"""All beats move by one lag where attacks common to them, looked for so far, are so many times as strong there as so
+near to the beats. Chosen by hand, for beeps whose sudden end is heard best."""
+
 TRUST_S = 0.020
+"""Standard deviation of where an attack lies about its beat. Chosen by hand."""
+
 SPAN_STEPS = 10
 LEAST_GAIN = 0.1
+"""Steps before and after over which the sound must grow, and share that an attack keeps where it does not. Chosen by
+hand."""
+
 ATTACK_LAG_S = -0.0031
+"""How early windows and bands show an attack. Measured on click trains of known times."""
+
 STIFFNESS = 20.0
 STRAY_S = 0.012
 N_ROUNDS = 4
+"""Price of a row's squared third differences, distance at which an attack counts half, and rounds of reweighting.
+Chosen by hand; measured on click trains of five sounds, 60 to 180 a minute and ramps, the median error is under 1
+ms."""
 
 
 def attack_strength(samples: Samples, sample_rate_hz: float, centre_s: Float, *, reach_s: float) -> Float:

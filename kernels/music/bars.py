@@ -10,9 +10,17 @@ Int = NDArray[np.int64]
 
 METERS = (4, 3, 2, 5, 7)
 LOG_PRIOR_PER_BEAT = (0.0, -0.03, -0.15, -0.12, -0.15)
+"""Beats of a bar that are tried, and how usual each is, nats a beat. Chosen by hand: seldom ones must be heard
+clearly."""
+
 LOG_BREAK = -6.0
+"""Nats for counting anew within a song. Chosen by hand."""
+
 LEAST_PROBABILITY = 0.02
+"""Probabilities nearer to 0 or 1 are not believed. Chosen by hand."""
+
 LEAST_MARGIN = 0.02
+"""Nats a beat by which counting must be better than the same one beat later. Chosen by hand."""
 
 
 def count_bars(downbeat_probability: Float) -> tuple[Int, Int]:

@@ -20,11 +20,23 @@ Int = NDArray[np.int64]
 
 TRACKERS = ("bar_pointer", "librosa")
 LEAST_CONFIDENCE = 0.15
+"""Mean probability of the beats below which there are none. Chosen by hand, so that noise, drones and tones have
+none."""
+
 LEVELS = (1 / 3, 1 / 2, 1.0, 2.0, 3.0)
+"""Tempi of candidates over the one found, by convention: those by which listeners disagree."""
+
 SLOWEST_CANDIDATE_BPM, FASTEST_CANDIDATE_BPM = 25.0, 450.0
+"""Chosen by hand, an octave beyond what is found."""
+
 LEVEL_TOLERANCE = 1.08
+"""How far the tempo of a candidate may stray from its level. Chosen by hand."""
+
 AUDIBLE_LEVEL = 0.02
+"""Log level of a mel band from which something is heard. Chosen by hand."""
+
 NEAR_S = 0.04
+"""How near to a beat its probability is looked up. Chosen as the reach of its attack."""
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,19 @@ from kernels.music.onsets import FRAME_RATE_HZ, Samples, band_levels, flux
 from kernels.types import Float
 
 GATHER_S = 0.07
-"""Onsets so far from a beat are gathered at it: the tolerance at which beats count as met."""
+"""Onsets so far from a beat are gathered at it: the tolerance at which beats count as met [Davies2009]."""
 
 LEAST_ONSET_RATIO = 0.02
-"""A beat weaker than this share of the song's strongest is silence, not rhythm."""
+"""A beat weaker than this share of the song's strongest is silence, not rhythm. Chosen by hand."""
 
 RANGE_DB = 40.0
-"""Levels so far below the song's 99th percentile, and lower, count as 0."""
+"""Levels so far below the song's 99th percentile, and lower, count as 0. Chosen by hand."""
 
 SILENCE_DB = -60.0
+"""A song whose 99th percentile is lower has no intensity. Chosen by hand."""
+
 LEVEL_WINDOW_S = 0.2
+"""Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from kernels.music.onsets import Samples, to_mono
 Float = NDArray[np.float64]
 
 ANALYSIS_RATE_HZ = 22050
+"""The rate librosa analyses at, by convention of its own."""
 
 
 def librosa_beats(samples: Samples, sample_rate_hz: float) -> Float:

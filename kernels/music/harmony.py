@@ -10,9 +10,15 @@ from kernels.music.onsets import FRAMES_AT_ONCE, Samples, to_mono
 Float = NDArray[np.float64]
 
 WINDOW_S = 0.1857
+"""8192 samples at 44.1 kHz. Chosen by hand."""
+
 LOWEST_KEY, N_KEYS = 33, 60
 N_BASS_KEYS = 24
+"""MIDI keys from 55 Hz on, five octaves, the lower two of which are bass. Chosen by hand. The weights of the pulse
+network hold for these alone."""
+
 BEFORE_AFTER_S = (0.3, 0.8)
+"""Spans before and after an instant that are compared. Chosen by hand; the weights hold for these alone."""
 
 
 def key_levels(samples: Samples, sample_rate_hz: float, *, frame_rate_hz: float) -> Float:

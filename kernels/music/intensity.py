@@ -10,6 +10,7 @@ from kernels.music.onsets import FRAMES_AT_ONCE, Samples, to_mono
 Float = NDArray[np.float64]
 
 FLOOR_DB = -100.0
+"""The least level there is, below the 96 dB of 16 bits. Chosen so that silence has a number."""
 
 
 def a_weighting_db(frequency_hz: Float) -> Float:

@@ -11,7 +11,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 DRUM_CHANNEL_NUMBER = 10
-"""Channel of percussion in General MIDI; its keys name instruments."""
+"""Channel of percussion in General MIDI [MMA1991]; its keys name instruments."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,16 @@ Float = NDArray[np.float64]
 Samples = NDArray[np.float32] | NDArray[np.float64]
 
 FRAME_RATE_HZ = 100.0
-"""Frames a second of every curve of this module."""
+"""Frames a second of every curve of this module, by convention of beat trackers [Davies2019]."""
 
 WINDOW_S = 0.0464
+"""2048 samples at 44.1 kHz [Bock2013]."""
+
 LOWEST_HZ, HIGHEST_HZ, N_BANDS = 30.0, 11000.0, 80
+"""Of the mel bands. Chosen by hand. The weights of the pulse network hold for these alone."""
+
 FRAMES_AT_ONCE = 1024
+"""Chosen for memory, by hand; changes no value."""
 
 
 def to_mono(samples: Samples) -> NDArray[np.float32]:

@@ -18,7 +18,7 @@ from kernels.types import Float, Int
 
 FIRST_KEY, LAST_KEY = 35, 81
 N_KEYS = LAST_KEY - FIRST_KEY + 1
-"""Percussion keys of General MIDI: 47 symbols."""
+"""Percussion keys of General MIDI [MMA1991]: 47 symbols, as in [Kameda2009]."""
 
 NEAREST_KEY: dict[int, int] = {
     22: 42,  # edge of the closed hi-hat, electronic kits
@@ -40,28 +40,37 @@ NEAREST_KEY: dict[int, int] = {
     86: 41,
     87: 41,  # surdo
 }
-"""Percussion keys beyond General MIDI that kits use, and the sounds of it nearest to them."""
+"""Percussion keys beyond General MIDI that kits use, and the sounds of it nearest to them. Chosen by hand, by what they
+are called."""
 
 KIT_KEYS = frozenset({22, 26, 36, 37, 38, 40, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 55, 57, 58, 59})
-"""Pads of an electronic kit; 58 is the rim of its third tom there, a vibraslap in General MIDI."""
+"""Pads of an electronic kit, by convention of its makers; 58 is the rim of its third tom there, a vibraslap in General
+MIDI."""
 
 RIM_KEY, RIM_SOUND = 58, 43
+"""That rim, and the tom of General MIDI it belongs to, by convention of the same kits."""
 
 LOW, MIDDLE, HIGH = 36, 38, 42
-"""Bass drum, snare and hi-hat stand for the bands that audio is heard in."""
+"""Bass drum, snare and hi-hat [MMA1991] stand for the bands that audio is heard in."""
 
 LOW_KEYS = frozenset({35, 36, 41, 43, 45, 64, 66})
 HIGH_KEYS = frozenset({42, 44, 46, 49, 51, 52, 53, 54, 55, 57, 59, 69, 70, 71, 72, 74, 80, 81})
+"""Which keys sound low and which high; the others are in the middle. Chosen by hand, by what they are called."""
+
 BAND_OF_KEY: Int = np.array(
     [LOW if k in LOW_KEYS else HIGH if k in HIGH_KEYS else MIDDLE for k in range(FIRST_KEY, LAST_KEY + 1)], np.int64
 )
 BANDS_HZ: dict[int, tuple[float, float]] = {LOW: (0.0, 150.0), MIDDLE: (200.0, 2500.0), HIGH: (5000.0, 20000.0)}
+"""Where audio is heard as each. Chosen by hand."""
 
 CONTOUR = ("leap down", "step down", "same", "step up", "leap up")
 """How a melody goes from one note to the next: a leap is more than four semitones."""
 
 LARGEST_STEP = 4
+"""Semitones. Chosen by hand: a major third is a step yet."""
+
 ONSET_WINDOW_S, LEAST_RISE = 0.1, 0.08
+"""How near two onsets of a band may be, and its least rise in log level. Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)

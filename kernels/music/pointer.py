@@ -11,8 +11,14 @@ Int = NDArray[np.int64]
 SLOWEST_BPM, FASTEST_BPM, N_INTERVALS = 55.0, 215.0, 60
 STEADINESS = 100.0
 BEAT_SHARE = 1 / 16
+"""Tempi, price of a changed interval (nats for each time its length), and the share of an interval that is the beat:
+after [Krebs2015], by convention of trackers that follow it."""
+
 LEAST_PROBABILITY = 0.005
+"""Probabilities nearer to 0 or 1 are not believed. Chosen by hand."""
+
 USUAL_BPM, USUAL_SPREAD_OCTAVES, USUAL_WEIGHT_PER_S = 130.0, 0.5, 3.0
+"""Chosen by hand: without it half as fast is found too often."""
 
 
 def beat_intervals(frame_rate_hz: float, *, slowest_bpm: float = SLOWEST_BPM, fastest_bpm: float = FASTEST_BPM) -> Int:

@@ -14,8 +14,13 @@ Float = NDArray[np.float64]
 
 TABLE_SIZE = 2048
 N_HARMONICS = 16
+"""Samples of a stored cycle, and its harmonics. Chosen by hand."""
+
 TAIL_S = 1.5
+"""What rings on after the last note. Chosen by hand."""
+
 PEAK = 0.8
+"""Of the loudest sample; full scale is 1. Chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -87,9 +92,11 @@ VOICES = (
     Voice(2.0, 0.5, 0.002, 0.15, 0.00, 0.10, 0.9),  # struck
     Voice(0.8, 1.0, 0.050, 0.50, 0.50, 0.20, 0.3),  # sound effects
 )
-"""One voice for each family of eight General MIDI programs."""
+"""One voice for each family of eight General MIDI programs [MMA1991]. Chosen by hand."""
 
 _TOM, _METAL = (0.6, 0.0), (0.0, 0.6)
+"""Bend and second partial of skins and of metal. Chosen by hand."""
+
 DRUMS: tuple[tuple[tuple[int, ...], DrumRecipe], ...] = (
     ((35, 36), DrumRecipe(55.0, 2.5, 0.0, 0.090, 0.004, 0.5)),  # bass drum
     ((37,), DrumRecipe(1700.0, 0.0, 0.0, 0.010, 0.008, 0.7)),  # side stick
@@ -110,7 +117,10 @@ DRUMS: tuple[tuple[tuple[int, ...], DrumRecipe], ...] = (
     ((75, 76, 77), DrumRecipe(1100.0, 0.0, 0.0, 0.020, 0.003, 0.5)),  # claves, blocks
     ((80, 81), DrumRecipe(4200.0, *_METAL, 0.200, 0.0, 0.0)),  # triangle
 )
+"""How keys of General MIDI percussion [MMA1991] sound. Chosen by hand."""
+
 OTHER_DRUM = DrumRecipe(1000.0, 0.0, 0.0, 0.012, 0.006, 0.6)
+"""What any other key sounds like. Chosen by hand."""
 
 
 def render_preview(notes: Notes, *, sample_rate_hz: int = 44100, seed: int = 0) -> NDArray[np.float32]:

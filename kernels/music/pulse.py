@@ -24,12 +24,20 @@ Float = NDArray[np.float64]
 Weights = NDArray[np.float32]
 
 PULSE_RATE_HZ = FRAME_RATE_HZ / 2
+"""Chosen for speed, by hand: half of what [Davies2019] use."""
+
 GROUP_EDGES_HZ = (0.0, 100.0, 200.0, 400.0, 800.0, 1600.0, 3000.0, 6000.0, 1e9)
 N_CHANNELS = 16
 LEAST_RISE = 0.03
+"""Bands whose rises the network is shown, its curves in all, and the rise that a quiet song is scaled to at most.
+Chosen by hand, about octaves; the weights of the network hold for these alone."""
+
 DILATIONS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 N_TAPS = 5
+"""Of the convolutions, after [Davies2019], who have eleven layers at 100 frames a second: 20 s either way are seen."""
+
 SPEEDS = (0.94, 1.0, 1.06)
+"""Speeds at which the network hears a song. Measured on songs kept apart: a point of F more than at one speed."""
 
 
 def pulse_features(level: Float, centre_hz: Float, change: Float) -> Float:

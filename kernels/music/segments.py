@@ -16,15 +16,21 @@ from kernels.music.onsets import FRAME_RATE_HZ, Samples, band_levels
 from kernels.types import Float, Int
 
 LONGEST_S = 8.0
-"""No segment is longer: eight seconds are 960 values of a feature."""
+"""No segment is longer: eight seconds are 960 values of a feature. Chosen for time, by hand."""
 
 SHORTEST_S = 1.5
+"""Shorter segments cost as much as the highest novelty. Chosen by hand."""
+
 WANTED_S = 4.0
-"""Segments of 8 beats where those are nearer to this, else of 4: about as long as a gesture phrase, and short enough
-for clips of five seconds to be tried at every scale."""
+"""Segments of 8 beats where those are nearer to this, else of 4. Chosen as about a gesture phrase, and short enough for
+clips of five seconds to be tried at every scale."""
 
 KERNEL_BEATS = 8
+"""Beats before and after that novelty [Foote2000] compares. Chosen by hand: two bars of four."""
+
 NOVELTY_WEIGHT, OFF_BAR, OFF_LENGTH = 1.0, 0.7, 1.0
+"""Gain of the highest novelty, and prices of a cut that is not on the first beat of a bar and of each doubling of the
+wanted length. Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)
