@@ -12,13 +12,13 @@ from assets.formats.errors import FormatError
 from assets.partitions import SESSION, lake_key
 from assets.plots import calibration as calibration_plots
 from assets.sources.calibration import CalibrationError, Solvers, calibrate_file, up_axis
-from assets.sources.sources import Clip, Studio, session_version
+from assets.sources.sources import ClipFile, Studio, session_version
 from assets.stamps import ClipStamp, Earlier, Part, Parts, Progress, content_version, version_of
 from assets.tables import pack
 from assets.tables.calibration import from_calibration
 from assets.tables.motion import from_pose, from_skeleton
 from kernels.skeleton.naming import map_joints
-from kernels.types import Clip as Motion
+from kernels.types import Clip
 from schemas.calibration import CALIBRATION
 from schemas.motion import CLIP, POSE, SKELETON
 
@@ -86,7 +86,7 @@ class _Reader:
             "suit": version_of(code, joints, sensors, repr(self._settings.calibration)),
         }
 
-    def read(self, session: str, clips: tuple[Clip, ...]) -> dict[str, Part]:
+    def read(self, session: str, clips: tuple[ClipFile, ...]) -> dict[str, Part]:
         """Make the tables of one session."""
         known = self._carried(session)
         rows, stamps, n_read = [], {}, 0
@@ -175,7 +175,7 @@ class _Reader:
             if row["clip_id"] in agreed and row["source_sha256"]
         }
 
-    def _parse(self, source: Clip) -> _Reading:
+    def _parse(self, source: ClipFile) -> _Reading:
         try:
             read = bvh.read(self._studio.file(source.path), max_bytes=self._max_bytes)
             take = bvh.to_clip(read, extra=self._settings.joints)
@@ -196,7 +196,7 @@ class _Reader:
             CALIBRATION.empty(),
         )
 
-    def _calibrate(self, source: Clip) -> _Reading:
+    def _calibrate(self, source: ClipFile) -> _Reading:
         try:
             found = calibrate_file(
                 self._studio.file(source.path),
@@ -224,7 +224,7 @@ class _Reader:
         )
 
 
-def _read(clip: Motion, **said: object) -> dict[str, object]:
+def _read(clip: Clip, **said: object) -> dict[str, object]:
     return {
         "frame_rate_hz": clip.frame_rate_hz,
         "frame_count": clip.n_frames,
@@ -249,7 +249,7 @@ def _refused(reason: str) -> dict[str, object]:
     return {**nothing, **texts, "state": "refused", "reason": reason, "warnings": []}
 
 
-def _row(clip: Clip, reading: dict[str, object]) -> dict[str, object]:
+def _row(clip: ClipFile, reading: dict[str, object]) -> dict[str, object]:
     facts = clip.facts
     return {
         **reading,

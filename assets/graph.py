@@ -9,7 +9,7 @@ import polars as pl
 import pyarrow as pa
 
 from assets.declare import table_assets
-from assets.graph_memory import Beats, Memory, keep, near_pairs, recall
+from assets.graph_memory import Beats, KeptArrays, keep, near_pairs, recall
 from assets.partitions import EVERY
 from assets.plots.draw import markdown
 from assets.plots.graph import motion_graph_picture
@@ -59,7 +59,7 @@ def motion_graph(
     motion_beat: Stored,
     studio: dg.ResourceParam[Studio],
     pair_distance: dg.ResourceParam[PairDistance],
-    graph_memory: dg.ResourceParam[Memory],
+    graph_memory: dg.ResourceParam[KeptArrays],
     progress: dg.ResourceParam[Progress],
 ) -> Iterator[dg.Output[Part] | dg.AssetCheckResult]:
     """Join the beats of all clips where one pose may follow another."""

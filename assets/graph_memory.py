@@ -33,7 +33,7 @@ class Beats:
     speed: Float
 
 
-class Memory(Protocol):
+class KeptArrays(Protocol):
     """Arrays kept beside the lake: losing them costs time, nothing else."""
 
     def recall(self) -> Mapping[str, NDArray[Any]] | None:
@@ -68,7 +68,7 @@ class Remembered:
         return old if (np.diff(old[old >= 0]) > 0).all() else None
 
 
-def recall(memory: Memory, rules: str) -> Remembered | None:
+def recall(memory: KeptArrays, rules: str) -> Remembered | None:
     """Read an earlier build made by the same rules; None when there is none."""
     kept = memory.recall()
     if kept is None or "rules" not in kept or str(kept["rules"]) != rules:
@@ -90,7 +90,7 @@ def recall(memory: Memory, rules: str) -> Remembered | None:
     return Remembered(clips, Shortlist(pairs, kept["radius"], kept["allowed_radius"]))
 
 
-def keep(memory: Memory, rules: str, beats: Sequence[Beats], features: BeatFeatures, listed: Shortlist) -> None:
+def keep(memory: KeptArrays, rules: str, beats: Sequence[Beats], features: BeatFeatures, listed: Shortlist) -> None:
     """Keep a build for the next."""
     pose, pairs = features.pose, listed.pairs
     memory.keep(

@@ -44,8 +44,8 @@ def performance(clip: Stored, song: Stored) -> Iterator[dg.Output[Part] | dg.Ass
     clips = [row for key in clip.keys for row in clip.read(key).to_pylist() if row["state"] == "read"]
     songs = [row for key in song.keys for row in song.read(key).to_pylist() if row["state"] == "read"]
     found, troubles = performances.pair(
-        [performances.Danced(r["clip_id"], r["path"], r["performed_to"], r["performed_offset_s"]) for r in clips],
-        [performances.Music(r["song_id"], r["path"], r["kind"]) for r in songs],
+        [performances.DancedClip(r["clip_id"], r["path"], r["performed_to"], r["performed_offset_s"]) for r in clips],
+        [performances.NamedSong(r["song_id"], r["path"], r["kind"]) for r in songs],
     )
     yield dg.Output(Part("", hmm_tables.from_performance(found), metadata={"troubles": "; ".join(troubles) or "none"}))
     yield dg.AssetCheckResult(

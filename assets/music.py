@@ -13,7 +13,7 @@ from assets.partitions import SONG, lake_key
 from assets.plots import matching as matching_plots
 from assets.plots.draw import markdown
 from assets.plots.music import song_beats
-from assets.sources.sources import Song, Studio, brief_version, song_version
+from assets.sources.sources import SongFile, Studio, brief_version, song_version
 from assets.stamps import Part, Parts, Progress, Stored, repeatable, version_of
 from assets.tables import matching as matching_tables
 from assets.tables import pack
@@ -67,7 +67,7 @@ def music(
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class SongAnalysis:
     """What a song is: its length and shape, its beats, its loudness."""
 
     duration_s: float
@@ -78,18 +78,18 @@ class Heard:
     loudness_db: Float
 
 
-def listen(song: Song, studio: Studio, settings: Settings) -> Heard:
+def listen(song: SongFile, studio: Studio, settings: Settings) -> SongAnalysis:
     """Read a song and find its beats, as its brief wants them.
 
     Parameters
     ----------
-    song : Song
+    song : SongFile
     studio : Studio
     settings : its settings
 
     Returns
     -------
-    Heard
+    SongAnalysis
 
     Raises
     ------
@@ -109,14 +109,14 @@ def listen(song: Song, studio: Studio, settings: Settings) -> Heard:
         analysis = track_beats(sound, rate_hz, tracker=settings.music_beat.tracker)
     time_s, level_db = loudness_db(sound, rate_hz, frame_rate_hz=LOUDNESS_RATE_HZ)
     analysis = _within(_as_briefed(analysis, studio.brief(song).beats, studio, song), duration_s)
-    return Heard(duration_s, 0 if song.kind == "midi" else rate_hz, n_channels, analysis, time_s, level_db)
+    return SongAnalysis(duration_s, 0 if song.kind == "midi" else rate_hz, n_channels, analysis, time_s, level_db)
 
 
 PREVIEW_RATE_HZ = 44100
 LOUDNESS_RATE_HZ = 20.0
 
 
-def _as_briefed(analysis: BeatAnalysis, brief: BeatsBrief, studio: Studio, song: Song) -> BeatAnalysis:
+def _as_briefed(analysis: BeatAnalysis, brief: BeatsBrief, studio: Studio, song: SongFile) -> BeatAnalysis:
     if brief.file:
         if "/" in brief.file or "\\" in brief.file:
             raise FormatError(
@@ -151,7 +151,7 @@ def _level_of(grid: BeatGrid) -> tuple[TempoCandidate, ...]:
     return (TempoCandidate(1.0, 60 / float(np.median(np.diff(grid.time_s))), 1.0, True),)
 
 
-def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
+def _parts(key: str, songs: Sequence[SongFile], studio: Studio) -> dict[str, Part]:
     """Make the tables of one song; a refused one gets its row and no beats."""
     version = version_of(song_version(songs), brief_version(studio, songs))
     rows, danceable = [], None
@@ -182,7 +182,7 @@ def _parts(key: str, songs: Sequence[Song], studio: Studio) -> dict[str, Part]:
     return parts
 
 
-def _heard_parts(key: str, heard: Heard, version: str) -> dict[str, Part]:
+def _heard_parts(key: str, heard: SongAnalysis, version: str) -> dict[str, Part]:
     grid, candidates = heard.analysis.grid, heard.analysis.tempo_candidates
     picture = song_beats(grid, heard.time_s, heard.loudness_db)
     levels = markdown(
@@ -197,7 +197,7 @@ def _heard_parts(key: str, heard: Heard, version: str) -> dict[str, Part]:
     return {name: Part(key, table, version, metadata=metadata) for name, (table, metadata) in made.items()}
 
 
-def _undanceable(heard: Heard) -> str:
+def _undanceable(heard: SongAnalysis) -> str:
     n = len(heard.analysis.grid.time_s)
     if n >= 2:
         return ""
@@ -209,7 +209,7 @@ def _undanceable(heard: Heard) -> str:
 SILENCE_DB = -60.0
 
 
-def _row(song: Song, heard: Heard | None, reason: str) -> dict[str, object]:
+def _row(song: SongFile, heard: SongAnalysis | None, reason: str) -> dict[str, object]:
     beats = heard.analysis.grid.time_s if heard and not reason else np.zeros(0)
     return {
         "song_id": song.key,

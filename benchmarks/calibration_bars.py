@@ -18,7 +18,7 @@ from kernels.calibration.cleaning import clean
 from kernels.calibration.faults import check_recording
 from kernels.calibration.pairs import pair_costs, spanning_tree
 from kernels.calibration.poses import body_model, solve_poses, to_stream
-from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, Finding, Recording
+from kernels.calibration.records import JOINTS, PARENT, SENSORS, Calibration, Cleaned, Recording, RecordingFinding
 from kernels.calibration.tree_solver import solve_tree
 from kernels.opencl.choice import pick_device
 from kernels.opencl.spring_relaxation import SpringRelaxation
@@ -43,7 +43,7 @@ def lengths(in_parent_m: Float, in_child_m: Float) -> Float:
     return np.array(found)
 
 
-def anchor_errors_mm(found: Calibration, body: suit.Body) -> Float:
+def anchor_errors_mm(found: Calibration, body: suit.SyntheticBody) -> Float:
     """Error of each joint, (16,), the larger of its two sensors' views."""
     return _MM * np.maximum(
         np.linalg.norm(found.in_parent_sensor_m - body.in_parent_sensor_m, axis=1),
@@ -51,7 +51,7 @@ def anchor_errors_mm(found: Calibration, body: suit.Body) -> Float:
     )
 
 
-def length_errors_mm(found: Calibration, body: suit.Body) -> Float:
+def length_errors_mm(found: Calibration, body: suit.SyntheticBody) -> Float:
     """Error of each length, (19,)."""
     truth = lengths(body.in_parent_sensor_m, body.in_child_sensor_m)
     return _MM * np.abs(lengths(found.in_parent_sensor_m, found.in_child_sensor_m) - truth)
@@ -261,7 +261,7 @@ def _twins(n_frames: int, context: cl.Context, device: str | None) -> Figures:
     return found | {"row14_springs_serial_is_parallel": float(is_same), "row14_distinct_digest_count": len(digests)}
 
 
-def judge(recording: Recording) -> tuple[Finding, ...]:
+def judge(recording: Recording) -> tuple[RecordingFinding, ...]:
     """Everything odori says about a recording's arrays."""
     if recording.sensors != SENSORS:
         return check_recording(recording)
@@ -269,7 +269,7 @@ def judge(recording: Recording) -> tuple[Finding, ...]:
 
 
 def _faults(n_frames: int, seeds: range) -> Figures:
-    def is_named(found: tuple[Finding, ...], severity: str, sensor: str | None, words: str) -> bool:
+    def is_named(found: tuple[RecordingFinding, ...], severity: str, sensor: str | None, words: str) -> bool:
         return any(one.severity == severity and one.sensor == sensor and words in one.sentence for one in found)
 
     missed: list[str] = []

@@ -74,7 +74,7 @@ def alone(seed: int) -> dict[str, float]:
     }
 
 
-def write(root: Path, name: str, performed: made_up.Performance, subject: str = "sumire") -> None:
+def write(root: Path, name: str, performed: made_up.SyntheticPerformance, subject: str = "sumire") -> None:
     """Put a performance into a studio."""
     folder = root / "clips" / subject
     folder.mkdir(parents=True, exist_ok=True)
@@ -124,7 +124,7 @@ def whole(seed: int, n_motions: int) -> dict[str, float]:
         }
 
 
-def errors(lake: Lake, rules: made_up.Rules, takes: dict[str, made_up.Performance]) -> dict[str, float]:
+def errors(lake: Lake, rules: made_up.Rules, takes: dict[str, made_up.SyntheticPerformance]) -> dict[str, float]:
     """Compare the stored model with the rules, states matched one to one by the motions they were given."""
     motions = lake.table("key_pose", "sumire").to_pylist()
     n_found = lake.table("basic_motion").num_rows

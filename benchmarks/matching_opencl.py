@@ -16,7 +16,7 @@ from kernels.matching.plan import BRUTE, BRUTE_SPARSE, Plan, built, bytes_a_fram
 from kernels.matching.score import SCALE_NUMERATORS, Match
 from kernels.opencl.choice import pick_device
 from kernels.opencl.match import Matcher
-from kernels.opencl.match_program import Program
+from kernels.opencl.match_program import MatchProgram
 from kernels.opencl.match_tables import Tables
 
 Answer = Callable[[list[Series]], list[list[Match]]]
@@ -33,7 +33,7 @@ def measured(
     growth: list[int],
 ) -> dict:
     """Figures of all kinds; `check` counts the ranks that differ from float64."""
-    program = Program(cl.Context([pick_device(device)]))
+    program = MatchProgram(cl.Context([pick_device(device)]))
     clock = Clock(is_cpu=program.is_cpu, repeats=repeats)
     figures: dict = {"device": program.name, "segments": n_segments, "clips": n_clips}
     segments, clips = make("energy", 48, n_clips, sources)
@@ -58,7 +58,9 @@ def n_lerps(plan: Plan, clips: list[Series]) -> int:
     return each * sum(len(clip) for clip in clips)
 
 
-def measure_kind(program: Program, segments: list[Series], clips: list[Series], clock: Clock, n_brute: int) -> dict:
+def measure_kind(
+    program: MatchProgram, segments: list[Series], clips: list[Series], clock: Clock, n_brute: int
+) -> dict:
     """Every way of searching one kind of data."""
     part = segments[:n_brute]
     share = n_terms(segments, clips) / n_terms(part, clips)
@@ -103,7 +105,9 @@ def measure_kind(program: Program, segments: list[Series], clips: list[Series], 
     }
 
 
-def measure_brute(program: Program, segments: list[Series], clips: list[Series], clock: Clock) -> tuple[float, float]:
+def measure_brute(
+    program: MatchProgram, segments: list[Series], clips: list[Series], clock: Clock
+) -> tuple[float, float]:
     """Terms a second (10^9) of the tuned search of everything, and of Numba's."""
     matcher = Matcher(program=program, plan=BRUTE)
     index = matcher.index(clips)
@@ -127,7 +131,9 @@ def measure_brute(program: Program, segments: list[Series], clips: list[Series],
     return terms / min(ours), terms / min(theirs)
 
 
-def measure_growth(program: Program, sources: list[NDArray[np.float64]], clock: Clock, counts: list[int]) -> list[dict]:
+def measure_growth(
+    program: MatchProgram, sources: list[NDArray[np.float64]], clock: Clock, counts: list[int]
+) -> list[dict]:
     """Query, index and memory of growing catalogues, 32 segments."""
     figures = []
     segments, clips = make("energy", 32, max(counts), sources)

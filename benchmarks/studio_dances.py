@@ -20,9 +20,9 @@ from upath import UPath
 
 from assets.dance import load_clips
 from assets.dancing.asked import Direction
-from assets.dancing.by_graph import Catalogue, by_graph, catalogue
+from assets.dancing.by_graph import GraphCatalogue, by_graph, catalogue
 from assets.reading.clips import read_clips
-from assets.reading.songs import PlayedSong, heard_song
+from assets.reading.songs import PlayedSong, played_song
 from assets.tables.graph import to_motion_graph
 from assets.tables.music import to_music_beat
 from kernels.types import Choreography, Clip, Float
@@ -68,7 +68,7 @@ class BuiltStudio:
         beats = self.stored("music_beat")
         return [key for key in beats.keys if beats.read(key).num_rows > 1]
 
-    def catalogue(self) -> Catalogue:
+    def catalogue(self) -> GraphCatalogue:
         """Read the motion graph and what is known of its clips."""
         graph, clip_ids = to_motion_graph(self._lake.table("motion_graph_node"), self._lake.table("motion_graph_edge"))
         clip = self.stored("clip")
@@ -79,9 +79,9 @@ class BuiltStudio:
         grid = to_music_beat(self._lake.table("music_beat", key))
         duration_s = float(max(self._lake.table("song", key)["duration_s"].to_pylist()))
         feature, repeat = (self._lake.table(name, key) for name in ("music_feature", "music_repeat"))
-        return heard_song(grid, duration_s, feature=feature, repeat=repeat)
+        return played_song(grid, duration_s, feature=feature, repeat=repeat)
 
-    def dance(self, known: Catalogue, key: str) -> Danced:
+    def dance(self, known: GraphCatalogue, key: str) -> Danced:
         """Choose the steps of a song by the graph method."""
         song = self.song(key)
         found = by_graph(known, song, self.settings, Direction())

@@ -17,7 +17,7 @@ from dagster_shared.error import SerializableErrorInfo
 
 from assets.formats import beside
 from assets.partitions import SESSION, SONG, dagster_key, lake_key
-from pipelines.freshness import Finding, Freshness
+from pipelines.freshness import Freshness, PartitionState
 from pipelines.jobs import JOB_OF_GROUP, job_of
 from pipelines.processes import is_running, started
 from pipelines.studio.files import StudioError, why
@@ -150,7 +150,7 @@ def plan(
 
 
 def _batches(
-    todo: Sequence[Finding], coming: Collection[tuple[str, str]], state: Freshness, instance: dg.DagsterInstance
+    todo: Sequence[PartitionState], coming: Collection[tuple[str, str]], state: Freshness, instance: dg.DagsterInstance
 ) -> list[Batch]:
     """Group partitions that need the same assets, and split them where Dagster's order has others between.
 

@@ -246,7 +246,7 @@ def search(
     with _Trouble(as_json):
         from pipelines.commands import search as searching
 
-        wish = searching.Wish(
+        wish = searching.MotionQuery(
             query=clip or "",
             k=k,
             label=label or (),

@@ -56,7 +56,7 @@ class Tried:
     reason: str = ""
 
 
-class Memory:
+class TrialMemory:
     """What trials came to, kept in the user's cache folder; a folder that cannot be written is no trouble.
 
     Parameters
@@ -114,11 +114,11 @@ class Devices:
     """
 
     def __init__(
-        self, wanted: str = "", *, say: Callable[[str], None] | None = None, memory: Memory | None = None
+        self, wanted: str = "", *, say: Callable[[str], None] | None = None, memory: TrialMemory | None = None
     ) -> None:
         self.wanted = wanted
         self._say = say or to_standard_error
-        self._memory = memory or Memory(settle())
+        self._memory = memory or TrialMemory(settle())
         self._failed: dict[int, str] = {}
         self._said = False
 

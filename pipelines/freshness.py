@@ -75,7 +75,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Finding:
+class PartitionState:
     """State of one partition of one asset, and why."""
 
     asset: str
@@ -283,35 +283,35 @@ class Freshness:
             return [key.split("|")[0]]
         return self.keys(of)
 
-    def state(self, asset: str, key: str, *, pending: Iterable[tuple[str, str]] = ()) -> Finding:
+    def state(self, asset: str, key: str, *, pending: Iterable[tuple[str, str]] = ()) -> PartitionState:
         """State of one partition; ``pending`` are partitions known not to be fresh."""
         node = self.assets[asset]
         inputs = self.inputs(asset, key)
         waits = set(pending)
         for name in node.inputs_of(key):
             if any((name, k) in waits for k in self._input_keys(node.kind, self.assets[name].kind, name, key)):
-                return Finding(asset, key, "waiting", f"{name} has to be made first")
+                return PartitionState(asset, key, "waiting", f"{name} has to be made first")
         if inputs is None:
-            return Finding(asset, key, "waiting", "an input has to be made first")
+            return PartitionState(asset, key, "waiting", "an input has to be made first")
         stamp = self.stamp(asset, key)
         if stamp is None:
-            return Finding(asset, key, "missing", "never made")
+            return PartitionState(asset, key, "missing", "never made")
         if stamp.code_version != node.code_version_of(key):
             now = node.code_version_of(key)
-            return Finding(asset, key, "stale", f"code version {stamp.code_version} is now {now}")
+            return PartitionState(asset, key, "stale", f"code version {stamp.code_version} is now {now}")
         if stamp.settings != self.settings_version(asset, key):
-            return Finding(asset, key, "stale", f"settings [{'], ['.join(node.settings_of(key))}] changed")
+            return PartitionState(asset, key, "stale", f"settings [{'], ['.join(node.settings_of(key))}] changed")
         expected = ({} if node.keeps else inputs) | (
             {"sources": self.source_version(asset, key)} if node.sources else {}
         )
         changed = sorted(name for name in expected if stamp.inputs.get(name) != expected[name])
         if changed:
-            return Finding(asset, key, "stale", f"{', '.join(changed)} changed")
+            return PartitionState(asset, key, "stale", f"{', '.join(changed)} changed")
         if node.writes_stages:
             lost = self._studio.lost_stages(*key.split("|"))
             if lost:
-                return Finding(asset, key, "stale", f"{', '.join(lost)} is not there any more")
-        return Finding(asset, key, "fresh")
+                return PartitionState(asset, key, "stale", f"{', '.join(lost)} is not there any more")
+        return PartitionState(asset, key, "fresh")
 
     def is_danced(self, key: str) -> bool:
         """Whether all that a dance consists of is as it was asked for."""
@@ -323,14 +323,14 @@ class Freshness:
         *,
         given_up: Collection[tuple[str, str]] = (),
         keys: Callable[[str, str], bool] | None = None,
-    ) -> list[Finding]:
+    ) -> list[PartitionState]:
         """State of every partition of every asset, or of some groups, inputs first.
 
         ``given_up`` are partitions that could not be made, ``keys`` says of (kind, key) which are to be made at all:
         nothing waits for the others.
         """
         wanted = set(groups) if groups is not None else None
-        found: list[Finding] = []
+        found: list[PartitionState] = []
         pending: set[tuple[str, str]] = set()
         for node in self.assets.values():
             for key in self.partitions(node.name):

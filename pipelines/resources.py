@@ -22,7 +22,7 @@ class NoProgress:
 
 
 class GraphMemory:
-    """Arrays the motion graph keeps in the lake; see :class:`assets.graph_memory.Memory`."""
+    """Arrays the motion graph keeps in the lake; see :class:`assets.graph_memory.KeptArrays`."""
 
     def __init__(self, lake: Lake) -> None:
         self._path = lake.root / "motion_graph.npz"

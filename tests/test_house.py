@@ -40,6 +40,18 @@ def test_package_files_hold_one_docstring_and_no_imports():
             assert re.fullmatch(r'"""[^"]+"""\n', path.read_text()), path
 
 
+def test_no_public_class_name_means_two_things():
+    """A reader knows from the name of a class alone which one is meant."""
+    found = [
+        (node.name, path)
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    ]
+    homes = {name: [p.relative_to(REPOSITORY).as_posix() for n, p in found if n == name] for name, _ in found}
+    assert {name: paths for name, paths in homes.items() if len(paths) > 1} == {}
+
+
 # Declarations, plain records and the thinnest glue are tested where they are used.
 TESTED_ELSEWHERE = {
     "assets/dancing/method.py",  # records

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from assets.dancing import licences, wishes
 from assets.dancing.asked import SOFT_WISH, Direction
-from assets.dancing.danced import Danced, Markdown
+from assets.dancing.danced import ChosenSteps, Markdown
 from assets.dancing.method import DanceOrder, Method
-from assets.dancing.pose_pins import Poses, to_pose_pins
+from assets.dancing.pose_pins import ClipPoses, to_pose_pins
 from assets.dancing.refusal import RefusalError
-from assets.dancing.wishes import GRAPH_PARTS, DirectionError, Nodes, Parts
+from assets.dancing.wishes import GRAPH_PARTS, DirectionError, Nodes, PartNames
 from assets.plots.dance import phrase_table
 from assets.reading.clips import read_clips
-from assets.reading.songs import PlayedSong, heard_song
+from assets.reading.songs import PlayedSong, played_song
 from assets.stamps import Stored
 from assets.tables.graph import to_motion_graph
 from kernels.assembly.timing import blend_widths, trim
@@ -38,7 +38,7 @@ Chosen by hand: 1 a centimetre."""
 
 
 @dataclass(frozen=True, eq=False)
-class Catalogue:
+class GraphCatalogue:
     """The motion graph as a director may use it: clips by index, and what is known of the clip of each node.
 
     ``poses`` are what pins of a pose need; None where there are no such pins.
@@ -48,7 +48,7 @@ class Catalogue:
     clip_ids: tuple[str, ...]
     nodes: Nodes
     is_allowed: NDArray[np.bool_]
-    poses: Poses | None = None
+    poses: ClipPoses | None = None
 
 
 def catalogue(
@@ -57,8 +57,8 @@ def catalogue(
     clips: pl.DataFrame,
     allow: Sequence[str],
     *,
-    poses: Poses | None = None,
-) -> Catalogue:
+    poses: ClipPoses | None = None,
+) -> GraphCatalogue:
     """Join the graph with what is known of its clips, and take out what licences forbid.
 
     Parameters
@@ -67,11 +67,11 @@ def catalogue(
     clip_ids : by clip index
     clips : rows of the table ``clip``
     allow : see :class:`Direction`
-    poses : see :class:`Catalogue`
+    poses : see :class:`GraphCatalogue`
 
     Returns
     -------
-    Catalogue
+    GraphCatalogue
         Without the transitions of clips that may not be changed, and without their mirror images: those are danced
         whole or not at all.
     """
@@ -93,17 +93,17 @@ def catalogue(
     ]
     is_allowed = np.array(may_be_danced or [True])[of_node]
     free_graph = replace(graph, source=graph.source[free], target=graph.target[free], weight=graph.weight[free])
-    return Catalogue(free_graph, clip_ids, nodes, is_allowed, poses)
+    return GraphCatalogue(free_graph, clip_ids, nodes, is_allowed, poses)
 
 
-def poses_of(canonical_pose: Stored, settings: Settings) -> Poses:
+def poses_of(canonical_pose: Stored, settings: Settings) -> ClipPoses:
     """Make ready what pins of a pose need; poses are as near as the graph's own threshold says of positions."""
     graph = settings.motion_graph
     threshold = graph.threshold if graph.metric == "position" and graph.threshold else THRESHOLD
-    return Poses(canonical_pose, threshold)
+    return ClipPoses(canonical_pose, threshold)
 
 
-def by_graph(known: Catalogue, song: PlayedSong, settings: Settings, asked: Direction) -> Danced:
+def by_graph(known: GraphCatalogue, song: PlayedSong, settings: Settings, asked: Direction) -> ChosenSteps:
     """Find the best way through the motion graph for a song, as it is asked for.
 
     Raises
@@ -147,7 +147,7 @@ def by_graph(known: Catalogue, song: PlayedSong, settings: Settings, asked: Dire
     columns = ("transition", "stay", "warp", "stride", "beat", "repetition", "diversity")
     every = {name: getattr(path, f"{name}_cost") for name in columns}
     every |= {"intensity": intensity, "wish": np.maximum(path.wish_cost - intensity, 0.0)}
-    return Danced(
+    return ChosenSteps(
         steps,
         {f"{name}_cost": values[kept] for name, values in every.items()},
         {
@@ -166,7 +166,7 @@ def by_graph(known: Catalogue, song: PlayedSong, settings: Settings, asked: Dire
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
+class PathTerms:
     """What is wished of a dance, for the search: (K, N) admitted, (K, N) priced, and prices of single steps.
 
     ``from_any`` says whether a pose is wished for at the start.
@@ -179,8 +179,8 @@ class Terms:
 
 
 def terms_of(
-    known: Catalogue, song: PlayedSong, pins: Sequence[Pin], asked: Direction, costs: PathCosts, strength: Float
-) -> Terms:
+    known: GraphCatalogue, song: PlayedSong, pins: Sequence[Pin], asked: Direction, costs: PathCosts, strength: Float
+) -> PathTerms:
     """Gather what a search is to keep and to pay; RefusalError where pins conflict."""
     mask = np.broadcast_to(known.is_allowed, (len(song.grid_s) - 1, len(known.is_allowed)))
     from_any = any(pin.steps and pin.first == 0 for pin in pins)
@@ -188,10 +188,10 @@ def terms_of(
         if pins:
             refuse_conflict(known, song, pins, asked, costs)
             mask = mask & admitted(pins, *mask.shape)
-        return Terms(mask, strength, step_price(pins), from_any)
+        return PathTerms(mask, strength, step_price(pins), from_any)
     soft = [replace(pin, steps=_softened(pin)) for pin in pins]
     price = strength + np.where(admitted(pins, *mask.shape), 0.0, SOFT_WISH) if pins else strength
-    return Terms(mask, price, step_price(soft), from_any)
+    return PathTerms(mask, price, step_price(soft), from_any)
 
 
 def _softened(pin: Pin) -> StepPrice:
@@ -203,20 +203,20 @@ def _softened(pin: Pin) -> StepPrice:
     }
 
 
-def reach_of(known: Catalogue, song: PlayedSong, costs: PathCosts) -> Reach:
+def reach_of(known: GraphCatalogue, song: PlayedSong, costs: PathCosts) -> Reach:
     """Make ready the question whether pins can be kept in a song."""
     starts = np.flatnonzero(known.is_allowed)
     return Reach(known.graph, song.grid_s, costs=costs, starts=starts, allowed=known.is_allowed)
 
 
-def strength_price(known: Catalogue, song: PlayedSong, settings: PathSettings) -> Float:
+def strength_price(known: GraphCatalogue, song: PlayedSong, settings: PathSettings) -> Float:
     """Price of movement unlike the music in strength, (K, N); zeros where the song's is not known."""
     if song.intensity is None or not settings.intensity_weight:
         return np.zeros((len(song.grid_s) - 1, len(known.graph.clip_index)))
     return intensity_price(song.intensity, known.graph, weight=settings.intensity_weight)
 
 
-def pins_of(known: Catalogue, song: PlayedSong, asked: Direction) -> list[Pin]:
+def pins_of(known: GraphCatalogue, song: PlayedSong, asked: Direction) -> list[Pin]:
     """Bring what is wished onto beats and nodes; RefusalError where a pin names no place of the song."""
     try:
         posed: dict[str, Pin] = {}
@@ -236,7 +236,7 @@ def no_place(error: DirectionError) -> RefusalError:
 
 
 def refuse_conflict(
-    known: Catalogue, song: PlayedSong, pins: Sequence[Pin], asked: Direction, costs: PathCosts
+    known: GraphCatalogue, song: PlayedSong, pins: Sequence[Pin], asked: Direction, costs: PathCosts
 ) -> None:
     """Raise RefusalError where pins cannot be kept, naming the fewest of them that cannot and what would help."""
     reach = reach_of(known, song, costs)
@@ -255,7 +255,7 @@ def conflicting(
     asked: Direction,
     song: PlayedSong,
     nodes: Nodes,
-    parts: Parts = GRAPH_PARTS,
+    parts: PartNames = GRAPH_PARTS,
 ) -> RefusalError:
     """Say which pins cannot be kept and what would help, for a person and for a machine."""
     told = wishes.sentences(conflict, pins, asked.wishes, song, nodes, parts)
@@ -269,7 +269,7 @@ def pin_of_step(pins: Sequence[Pin], beat: int, span: int) -> str | None:
     return next((pin.name for pin in pins if beat < pin.last and beat + span > pin.first), None)
 
 
-def kept_pins(pins: Sequence[Pin], song: PlayedSong, path: Path, known: Catalogue) -> list[dict[str, object]]:
+def kept_pins(pins: Sequence[Pin], song: PlayedSong, path: Path, known: GraphCatalogue) -> list[dict[str, object]]:
     """Facts of each pin for machines: whether it is kept, from when to when, by which clips."""
     clip: dict[int, str] = {}
     node: dict[int, int] = {}
@@ -340,7 +340,7 @@ def chosen_steps(
     return replace(steps, blend_s=width), kept
 
 
-def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
+def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
     """Find the best way through the stored motion graph; see :class:`assets.dancing.method.Method`.
 
     Parameters
@@ -357,7 +357,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
     poses = poses_of(inputs["canonical_pose"], order.settings)
     known = catalogue(graph, clip_ids, read_clips(inputs["clip"]), order.direction.allow, poses=poses)
     feature, repeat = (inputs[name].read(order.song_id) for name in ("music_feature", "music_repeat"))
-    song = heard_song(order.beats, order.duration_s, feature=feature, repeat=repeat)
+    song = played_song(order.beats, order.duration_s, feature=feature, repeat=repeat)
     return by_graph(known, song, order.settings, order.direction)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assets.dancing import hmm_wishes, licences
 from assets.dancing.asked import Direction
-from assets.dancing.danced import Danced, Markdown
+from assets.dancing.danced import ChosenSteps, Markdown
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.recordings import choose_recordings, ends_of
 from assets.dancing.refusal import RefusalError
@@ -19,7 +19,7 @@ from assets.plots import hmm as hmm_plots
 from assets.plots.dance import phrase_table
 from assets.reading.clips import read_clips
 from assets.reading.hearing import hear
-from assets.reading.songs import PlayedSong, heard_song
+from assets.reading.songs import PlayedSong, played_song
 from assets.stamps import Stored, repeatable
 from assets.tables import hmm as hmm_tables
 from assets.tables.hmm import ClipMotions
@@ -31,7 +31,7 @@ from kernels.hmm.instances import Motions
 from kernels.hmm.links import link
 from kernels.hmm.model import Model
 from kernels.hmm.pins import SpanReach
-from kernels.hmm.places import Places, Wish, crowded_cost, keep_wishes, place
+from kernels.hmm.places import MotionWish, Places, crowded_cost, keep_wishes, place
 from kernels.hmm.seams import Ends
 from kernels.hmm.viterbi import Spans, best_spans, sample_spans
 from kernels.matching.path import to_choreography
@@ -140,7 +140,7 @@ def _pool(usable: Mapping[str, ClipMotions], pinned: set[str], performed: set[st
 
 
 @dataclass(frozen=True, eq=False)
-class Music:
+class HeardSong:
     """A song as the dancer hears it.
 
     Parameters
@@ -173,7 +173,7 @@ def by_hmm(
     *,
     temperature: float | None,
     seed: int,
-) -> Danced:
+) -> ChosenSteps:
     """Choose basic motions by the model and what the recordings let be joined, then the best recording of each.
 
     Raises
@@ -198,7 +198,7 @@ def by_hmm(
     if not reach.is_danceable:
         raise RefusalError(_no_length(music, motions.end_s - motions.start_s))
     pins = hmm_wishes.kept_or_refused(reach, dancer.nodes, song, asked)
-    wishes = [Wish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
+    wishes = [MotionWish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
     wish_price = hmm_wishes.price(asked) / music.parts
     wished = keep_wishes(places, wishes, price=wish_price) if wishes else places
     crowded = crowded_cost(music.grid_s, song.duration_s, blend_s=settings.dance.blend_s)
@@ -259,10 +259,10 @@ def by_hmm(
     }
     spanned = zip(spans.start[span_of].tolist(), spans.length[span_of].tolist(), strict=True)
     served = [hmm_wishes.served(pins, music.parts, start, length) for start, length in spanned]
-    return Danced(steps, columns, metadata, served, states=spans.state[span_of])
+    return ChosenSteps(steps, columns, metadata, served, states=spans.state[span_of])
 
 
-def listen(dancer: Dancer, percussion: pa.Table, melody: pa.Table, beat_s: Float, settings: Settings) -> Music:
+def listen(dancer: Dancer, percussion: pa.Table, melody: pa.Table, beat_s: Float, settings: Settings) -> HeardSong:
     """Cut the beats as finely as the dancer's motions are short, and hear what sounds in each part."""
     lengths = dancer.motions.end_s - dancer.motions.start_s
     parts = durations.parts_per_beat(float(np.median(np.diff(beat_s))), lengths)
@@ -271,10 +271,10 @@ def listen(dancer: Dancer, percussion: pa.Table, melody: pa.Table, beat_s: Float
     longest = int(np.clip(np.floor(lengths.max() * durations.MOST_WARP / step_s), 1, LONGEST_SPAN))
     grid_s = np.append(inner_s, inner_s[-1] + step_s * (1 + np.arange(longest - 1)))
     heard = hear(percussion, melody, inner_s, symbols=settings.choreography_model.symbols)
-    return Music(grid_s, parts, np.arange(len(grid_s)) % parts == 0, heard.log_likelihood(dancer.model))
+    return HeardSong(grid_s, parts, np.arange(len(grid_s)) % parts == 0, heard.log_likelihood(dancer.model))
 
 
-def _lasting(dancer: Dancer, music: Music, places: Places) -> Float:
+def _lasting(dancer: Dancer, music: HeardSong, places: Places) -> Float:
     """Log probabilities of how long basic motions last, (G, D, K); -inf where no recording may be danced."""
     motions, n = dancer.motions, dancer.model.n_states
     length_s = motions.end_s - motions.start_s
@@ -306,7 +306,7 @@ def _decoded(
     return Spans(motions.state[chain.motion], chain.start, chain.length), chain
 
 
-def _model_costs(model: Model, music: Music, spans: Spans) -> tuple[Float, Float]:
+def _model_costs(model: Model, music: HeardSong, spans: Spans) -> tuple[Float, Float]:
     """Price each span by the model and by the music, (S,) each."""
     before = np.append(0, spans.state[:-1])
     log_model = np.where(spans.start == 0, model.log_initial[spans.state], model.log_transition[before, spans.state])
@@ -321,7 +321,7 @@ def _shared(spans: Spans, other: Spans, n: int) -> float:
     return float((each[0] == each[1]).mean())
 
 
-def _no_length(music: Music, length_s: Float) -> str:
+def _no_length(music: HeardSong, length_s: Float) -> str:
     step_s = float(np.median(np.diff(music.grid_s))) * music.parts
     return (
         f"no motions of known kinds cover its beats: a beat lasts {step_s:.2f} s and motions {length_s.min():.2f} to "
@@ -329,7 +329,7 @@ def _no_length(music: Music, length_s: Float) -> str:
     )
 
 
-def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
+def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
     """Dance a song by the stored model of the dancer; see :class:`assets.dancing.method.Method`.
 
     Parameters
@@ -356,7 +356,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
             dancer,
             inputs["percussion"].read(order.song_id),
             inputs["melody"].read(order.song_id),
-            heard_song(order.beats, order.duration_s),
+            played_song(order.beats, order.duration_s),
             inputs["canonical_pose"],
             order.settings,
             order.direction,

@@ -7,8 +7,8 @@ import numpy as np
 import pyarrow as pa
 
 from assets.dancing import licences
-from assets.dancing.danced import Danced, Markdown
-from assets.dancing.match_pieces import LoadedMatches, Piece, load_matches, pieces_of
+from assets.dancing.danced import ChosenSteps, Markdown
+from assets.dancing.match_pieces import LoadedMatches, MatchPiece, load_matches, pieces_of
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.refusal import RefusalError
 from assets.plots import matching as matching_plots
@@ -32,7 +32,7 @@ MARGIN_COST = 0.5
 """Price of a blend half of which would lie past the clip's end. Chosen by hand."""
 
 
-def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, settings: Settings) -> Danced:
+def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, settings: Settings) -> ChosenSteps:
     """Choose one piece a segment: by rhythm, intensity, pace, joints and repetition.
 
     Parameters
@@ -44,7 +44,7 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
 
     Returns
     -------
-    Danced
+    ChosenSteps
 
     Raises
     ------
@@ -116,7 +116,7 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         "phrases": Markdown(phrase_table(steps)),
         "choice": Markdown(matching_plots.chosen(spans, used, chosen)),
     }
-    return Danced(steps, costs, metadata)
+    return ChosenSteps(steps, costs, metadata)
 
 
 def _share(masks: Sequence[Any]) -> float:
@@ -125,8 +125,8 @@ def _share(masks: Sequence[Any]) -> float:
 
 
 def joints_of(
-    pieces: Sequence[Sequence[Piece]], spans: Float, canonical_pose: Stored, *, blend_s: float, seam_weight: float
-) -> tuple[connect.Thresholds, list[path.Joint]]:
+    pieces: Sequence[Sequence[MatchPiece]], spans: Float, canonical_pose: Stored, *, blend_s: float, seam_weight: float
+) -> tuple[connect.ConnectionThresholds, list[path.Joint]]:
     """Compare the ends of all pieces with the starts of the next, and say which connect.
 
     Parameters
@@ -199,7 +199,7 @@ def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str,
             yield moved.clip_id, link_directions(position, root, CANONICAL.parent), usable_s
 
 
-def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> Danced:
+def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
     """Dance a song by its stored matches; see :class:`assets.dancing.method.Method`.
 
     Parameters

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from assets.formats import tree, usd_character
 from assets.formats.errors import FormatError
-from assets.formats.usd_character import Copy, Rig
+from assets.formats.usd_character import Copy, UsdRig
 from assets.sources.sources import FilePath, Sources, Studio, brief_of, fingerprint, request_of
 from assets.stamps import Stored
 from assets.tables.motion import to_pose, to_skeleton
@@ -34,7 +34,7 @@ class Cast:
 
     figure: Skeleton
     facts: Mapping[str, object] = field(default_factory=dict)
-    rig: Rig | None = None
+    rig: UsdRig | None = None
     copy: Copy | None = None
 
 

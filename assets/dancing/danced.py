@@ -14,7 +14,7 @@ class Markdown(str):
 
 
 @dataclass(frozen=True, eq=False)
-class Danced:
+class ChosenSteps:
     """Steps a method chose, their costs by column (0 for the columns of other methods), and what to show of them.
 
     ``metadata`` are numbers, texts, :class:`Markdown`, and lists and mappings of these; ``states`` are basic motions by

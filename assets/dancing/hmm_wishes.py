@@ -6,12 +6,12 @@ from assets.dancing import wishes
 from assets.dancing.asked import SOFT_WISH, Direction
 from assets.dancing.by_graph import conflicting, no_place
 from assets.dancing.refusal import RefusalError
-from assets.dancing.wishes import DirectionError, Nodes, Parts
+from assets.dancing.wishes import DirectionError, Nodes, PartNames
 from assets.reading.songs import PlayedSong
 from kernels.graph.pins import Pin, find_conflict
 from kernels.hmm.pins import SpanReach
 
-MOTION_PARTS = Parts("motions of known kinds", "row of motions")
+MOTION_PARTS = PartNames("motions of known kinds", "row of motions")
 
 
 def kept_or_refused(reach: SpanReach, nodes: Nodes, song: PlayedSong, asked: Direction) -> list[Pin]:

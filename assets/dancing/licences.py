@@ -33,7 +33,7 @@ _TOKEN = re.compile(r"\(|\)|[^\s()]+")
 
 
 @dataclass(frozen=True, order=True)
-class Terms:
+class LicenceTerms:
     """What one licence, or several together, forbid and demand; compared from the freest to the most restrictive.
 
     Parameters
@@ -51,16 +51,16 @@ class Terms:
     share_alike: bool = False
     attribution: bool = False
 
-    def __or__(self, other: "Terms") -> "Terms":
-        """Terms of both together."""
-        return Terms(*(getattr(self, n) or getattr(other, n) for n in self.__dataclass_fields__))
+    def __or__(self, other: "LicenceTerms") -> "LicenceTerms":
+        """Join the terms of both."""
+        return LicenceTerms(*(getattr(self, n) or getattr(other, n) for n in self.__dataclass_fields__))
 
     def words(self) -> list[str]:
         """Name the terms, worst first; empty for none."""
         return [name.removeprefix("is_").replace("_", " ") for name in self.__dataclass_fields__ if getattr(self, name)]
 
 
-def terms_of(licence: str) -> Terms:
+def terms_of(licence: str) -> LicenceTerms:
     """Read the terms of a licence's name.
 
     Parameters
@@ -70,18 +70,18 @@ def terms_of(licence: str) -> Terms:
 
     Returns
     -------
-    Terms
+    LicenceTerms
         Of ``A AND B`` both, of ``A OR B`` the freer. Of a name that is none of these: attribution, and not to leave the
         studio until somebody has read it.
     """
     words = _TOKEN.findall(licence.strip().upper())
     if {"AND", "OR", "WITH"} & set(words):
         terms, rest = _either(words)
-        return terms if not rest else Terms(is_internal=True, attribution=True)
+        return terms if not rest else LicenceTerms(is_internal=True, attribution=True)
     return _terms_of_name(licence.strip().upper())
 
 
-def _either(words: list[str]) -> tuple[Terms, list[str]]:
+def _either(words: list[str]) -> tuple[LicenceTerms, list[str]]:
     """Read ``A OR B …``: the freest; what is left of the words comes back too."""
     terms, rest = _both(words)
     while rest[:1] == ["OR"]:
@@ -90,7 +90,7 @@ def _either(words: list[str]) -> tuple[Terms, list[str]]:
     return terms, rest
 
 
-def _both(words: list[str]) -> tuple[Terms, list[str]]:
+def _both(words: list[str]) -> tuple[LicenceTerms, list[str]]:
     """Read ``A AND B …``: the terms of all."""
     terms, rest = _one(words)
     while rest[:1] == ["AND"]:
@@ -99,7 +99,7 @@ def _both(words: list[str]) -> tuple[Terms, list[str]]:
     return terms, rest
 
 
-def _one(words: list[str]) -> tuple[Terms, list[str]]:
+def _one(words: list[str]) -> tuple[LicenceTerms, list[str]]:
     """Read one name, or an expression in brackets; an exception (``WITH …``) changes nothing here."""
     if words[:1] == ["("]:
         terms, rest = _either(words[1:])
@@ -109,13 +109,13 @@ def _one(words: list[str]) -> tuple[Terms, list[str]]:
     return terms, rest[2:] if rest[:1] == ["WITH"] else rest
 
 
-def _terms_of_name(name: str) -> Terms:
+def _terms_of_name(name: str) -> LicenceTerms:
     if name in _FREE:
-        return Terms()
+        return LicenceTerms()
     if _SHARE_ALIKE.match(name):
-        return Terms(share_alike=True, attribution=True)
+        return LicenceTerms(share_alike=True, attribution=True)
     parts = set(name.replace(" ", "-").split("-"))
-    return Terms(
+    return LicenceTerms(
         is_internal=not _COMMONS.fullmatch(name.replace(" ", "-")),
         no_derivatives="ND" in parts,
         non_commercial="NC" in parts,
@@ -124,7 +124,7 @@ def _terms_of_name(name: str) -> Terms:
     )
 
 
-def together(licences: Iterable[str]) -> tuple[str, Terms]:
+def together(licences: Iterable[str]) -> tuple[str, LicenceTerms]:
     """Find the licence that rules a dance made of clips of several.
 
     Parameters
@@ -138,7 +138,7 @@ def together(licences: Iterable[str]) -> tuple[str, Terms]:
     terms : of all of them together
     """
     named = sorted({licence.strip() or STUDIO for licence in licences})
-    terms = Terms()
+    terms = LicenceTerms()
     for licence in named:
         terms |= terms_of(licence)
     return max(named, key=lambda licence: (terms_of(licence), [-ord(c) for c in licence]), default=""), terms

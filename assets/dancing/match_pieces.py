@@ -63,7 +63,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Piece:
+class MatchPiece:
     """A stretch of a clip a span of the song may be danced with, and its own costs.
 
     ``start_s`` and ``end_s`` are seconds of the clip; ``rank_number`` is 0 where it fills a span without a match.
@@ -142,7 +142,7 @@ def _longest(motion_feature: Stored, may_dance: Container[str], *, most: int = 2
     return {names[i] for i in longest_first(np.array([sizes[n] for n in names], np.int64), most=most)}
 
 
-def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) -> tuple[Float, list[list[Piece]]]:
+def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) -> tuple[Float, list[list[MatchPiece]]]:
     """Pieces every span of the song may be danced with: (S + 1,) edges of the spans, and S lists.
 
     A segment without a match becomes as many spans as the longest clip needs, each with the longest clips' beginnings.
@@ -164,7 +164,7 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
     )
     parts = matching_tables.segment_rhythms(found.segments, found.rhythm)
     edges: list[float] = [0.0]
-    every: list[list[Piece]] = []
+    every: list[list[MatchPiece]] = []
     for i, matches in enumerate(found.matches):
         start_s, end_s = float(found.segments.start_s[i]), float(found.segments.end_s[i])
         if matches.clip_ids:
@@ -185,7 +185,7 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
         for a, b in zip(*_pairs(split_span(start_s, end_s, beat_s=beat_s, longest_s=longest_s)), strict=True):
             every.append(
                 [
-                    Piece(names[n], 0.0, b - a, 0, settings.match_weight, settings.intensity_weight, 0.0)
+                    MatchPiece(names[n], 0.0, b - a, 0, settings.match_weight, settings.intensity_weight, 0.0)
                     for n in order
                     if found.clips[names[n]].duration_s >= b - a - 1e-9
                 ]
@@ -237,7 +237,7 @@ def _piece(
     settings: MatchPathSettings,
     *,
     is_eased: bool = False,
-) -> Piece:
+) -> MatchPiece:
     """Make one place of a clip a piece, and price it."""
     segments, clip = found.segments, found.clips[place.clip_id]
     numerator, start = place.numerator, place.start_frame_index
@@ -268,7 +268,7 @@ def _piece(
         rank_correlation(intensity.beat_means(music, cut), intensity.beat_means(motion, cut)),
     )
     warp = (end_s - start_s) / (clip_end_s - clip_s)
-    return Piece(
+    return MatchPiece(
         place.clip_id,
         clip_s,
         clip_end_s,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from assets.dancing.asked import Direction
-from assets.dancing.danced import Danced
+from assets.dancing.danced import ChosenSteps
 from assets.stamps import Stored
 from kernels.types import BeatGrid
 from schemas.settings import Settings
@@ -57,7 +57,7 @@ class Method:
     version: str
     inputs: tuple[str, ...]
     settings: tuple[str, ...]
-    choose: Callable[[Mapping[str, Stored], DanceOrder], Danced]
+    choose: Callable[[Mapping[str, Stored], DanceOrder], ChosenSteps]
     keeps_pins: bool = True
     has_alternatives: bool = False
     draws: bool = False

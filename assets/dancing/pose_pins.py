@@ -30,7 +30,7 @@ ON_TIME_S = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class ClipPoses:
     """The poses of all clips, read as they are asked for.
 
     Parameters
@@ -123,7 +123,7 @@ def to_pose_pins(
     song: PlayedSong,
     graph: MotionGraph,
     clip_ids: tuple[str, ...],
-    poses: Poses,
+    poses: ClipPoses,
     *,
     weight: float,
 ) -> dict[str, Pin]:
@@ -134,7 +134,7 @@ def to_pose_pins(
     wishes : PinWish; those for a pose count
     song : PlayedSong
     graph, clip_ids : the motion graph of N nodes, and its clips
-    poses : Poses
+    poses : ClipPoses
     weight : float, >= 0, price of a metre
 
     Returns
@@ -269,7 +269,7 @@ def shown_pose(
     moment_s: float,
     lineage: pl.DataFrame,
     dance: CanonicalClip,
-    poses: Poses,
+    poses: ClipPoses,
     beats: pl.DataFrame,
 ) -> dict[str, Any]:
     """Tell what a finished dance shows at the moment of a wish for a pose.
@@ -280,7 +280,7 @@ def shown_pose(
     moment_s : float, seconds of the song
     lineage : rows of ``frame_lineage`` of the dance
     dance : its frames, as a clip
-    poses : Poses
+    poses : ClipPoses
     beats : rows of ``motion_graph_node``
 
     Returns

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assets.dancing.asked import Direction
-from assets.dancing.by_graph import Catalogue, path_costs, pins_of, reach_of, search, strength_price, terms_of
+from assets.dancing.by_graph import GraphCatalogue, path_costs, pins_of, reach_of, search, strength_price, terms_of
 from assets.dancing.wishes import stretch
 from assets.reading.songs import PlayedSong
 from kernels.graph.path import STEPS, first_beats, more_than_any
 from kernels.graph.pins import admitted
-from kernels.graph.program import Program
+from kernels.graph.program import PathProgram
 from kernels.graph.proposals import Proposals
 from kernels.graph.structure import structure_pins
 from kernels.types import Float, Int
@@ -53,7 +53,9 @@ def place_of(text: str, song: PlayedSong) -> Asked:
     return Asked(text, first, last, float(max(song.grid_s[first], 0.0)), float(min(song.grid_s[last], song.duration_s)))
 
 
-def propose(known: Catalogue, song: PlayedSong, settings: Settings, asked: Direction, place: Asked) -> dict[str, Any]:
+def propose(
+    known: GraphCatalogue, song: PlayedSong, settings: Settings, asked: Direction, place: Asked
+) -> dict[str, Any]:
     """Price everything that could be pinned at a place, other pins kept.
 
     Parameters
@@ -106,7 +108,7 @@ def propose(known: Catalogue, song: PlayedSong, settings: Settings, asked: Direc
     return found
 
 
-def _of_clip(known: Catalogue, place: Asked, node: int, best: int) -> Mapping[str, Any]:
+def _of_clip(known: GraphCatalogue, place: Asked, node: int, best: int) -> Mapping[str, Any]:
     """Tell of a clip what is seen of it where it is cheapest; a pin cannot name the pose of a mirror image."""
     shown = node if best < 0 else best
     told = {"label": str(known.nodes.label[shown]), "style": str(known.nodes.style[shown])}
@@ -118,7 +120,7 @@ def _of_clip(known: Catalogue, place: Asked, node: int, best: int) -> Mapping[st
     return {**told, "clip_time_s": at_s, "is_mirrored": is_image, **pose}
 
 
-def _of_many(known: Catalogue, nodes: NDArray[np.bool_], best: int) -> Mapping[str, Any]:
+def _of_many(known: GraphCatalogue, nodes: NDArray[np.bool_], best: int) -> Mapping[str, Any]:
     cheapest = {} if best < 0 else {"cheapest_clip": str(known.nodes.clip_id[best])}
     return {"clip_count": len(np.unique(known.nodes.clip_id[nodes])), **cheapest}
 
@@ -169,7 +171,7 @@ def _least(through: Float, group: Int, n: int) -> tuple[Float, Int]:
 
 
 def _solved(
-    known: Catalogue, song: PlayedSong, settings: PathSettings, asked: Direction, place: Asked
+    known: GraphCatalogue, song: PlayedSong, settings: PathSettings, asked: Direction, place: Asked
 ) -> Iterator[tuple[Proposals, float]]:
     """Solve the song as the search would: from first beats, then from any, past the bounds where there is no other way.
 
@@ -192,7 +194,7 @@ def _solved(
     most = more_than_any(graph, song.grid_s, costs=costs, **wished)
     is_begun = False
     for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
-        program = Program(
+        program = PathProgram(
             graph,
             song.grid_s,
             steps=STEPS,

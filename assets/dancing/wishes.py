@@ -18,14 +18,14 @@ class DirectionError(ValueError):
 
 
 @dataclass(frozen=True)
-class Parts:
+class PartNames:
     """What a method makes dances of, as sentences call it: the parts, and a sequence of them."""
 
     many: str
     way: str
 
 
-GRAPH_PARTS = Parts("beats", "way through the motion graph")
+GRAPH_PARTS = PartNames("beats", "way through the motion graph")
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ def sentences(
     wishes: Sequence[PinWish],
     song: PlayedSong,
     nodes: Nodes,
-    parts: Parts = GRAPH_PARTS,
+    parts: PartNames = GRAPH_PARTS,
 ) -> list[str]:
     """Say which pins cannot be kept, why, and what would help.
 

@@ -182,7 +182,7 @@ def frame_rate_hz(frame_time_text: str) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class BvhTake:
     """A clip in our world, and what its file was taken to mean.
 
     Parameters
@@ -200,7 +200,7 @@ class Take:
     mapping: naming.JointMapping | None
 
 
-def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> Take:
+def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> BvhTake:
     """Bring a file to metres, Y up and quaternions.
 
     Position channels stand in place of OFFSET, axis by axis; the root's may add to it, which is decided by what puts
@@ -214,7 +214,7 @@ def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> Take:
 
     Returns
     -------
-    Take
+    BvhTake
         The clip's ``translation_xyz_m`` is None unless channels move a joint off its OFFSET by more than 1/10,000 of
         the body's height.
 
@@ -254,7 +254,7 @@ def to_clip(bvh: Bvh, *, extra: Mapping[str, str] | None = None) -> Take:
         rotation_wxyz=rotation.continuous(axes.rotations_to_y_up(local, world.up_axis)),
         translation_xyz_m=translation_m,
     )
-    return Take(clip, world, mapping)
+    return BvhTake(clip, world, mapping)
 
 
 def _skeleton_in_units(bvh: Bvh) -> Skeleton:

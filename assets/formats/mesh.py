@@ -41,7 +41,7 @@ _ARC = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class BodyMesh:
     """Triangles of a body at rest, each vertex carried by one joint.
 
     Parameters
@@ -60,7 +60,7 @@ class Body:
     side_index: Int
 
 
-def body(skeleton: Skeleton) -> Body:
+def body(skeleton: Skeleton) -> BodyMesh:
     """Build the mannequin of a skeleton.
 
     Parameters
@@ -69,7 +69,7 @@ def body(skeleton: Skeleton) -> Body:
 
     Returns
     -------
-    Body
+    BodyMesh
         At least one part; equal skeletons give equal arrays. Bones of no length get no part.
     """
     rest = rest_position(skeleton)
@@ -85,7 +85,7 @@ def body(skeleton: Skeleton) -> Body:
         np.concatenate([mesh.faces for _, mesh in parts]) + first[:, None],
         process=False,
     )
-    return Body(
+    return BodyMesh(
         point_xyz_m=np.array(whole.vertices),
         normal_xyz=np.array(whole.vertex_normals),
         triangle=np.array(whole.faces, np.int64),

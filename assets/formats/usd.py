@@ -26,7 +26,7 @@ from kernels.types import Clip, Float, Skeleton
 from schemas import usd as contract
 
 if TYPE_CHECKING:
-    from assets.formats.mesh import Body
+    from assets.formats.mesh import BodyMesh
 
 # Linear colours one can tell apart with any eyes: left vermilion, right blue.
 SIDE_RGB: dict[str, tuple[float, float, float]] = {
@@ -251,7 +251,7 @@ def _write_skeleton(stage: Usd.Stage, skeleton: Skeleton) -> None:
     UsdSkel.BindingAPI.Apply(skel.GetPrim()).CreateAnimationSourceRel().SetTargets([contract.ANIMATION_PATH])
 
 
-def _write_body(stage: Usd.Stage, shape: Body) -> None:
+def _write_body(stage: Usd.Stage, shape: BodyMesh) -> None:
     """Define the mesh, its skinning and one material a side."""
     mesh = UsdGeom.Mesh.Define(stage, contract.MESH_PATH)
     point = shape.point_xyz_m.astype(np.float32)
@@ -298,7 +298,7 @@ def _write_body(stage: Usd.Stage, shape: Body) -> None:
         UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(material)
 
 
-def _write_extent(stage: Usd.Stage, clip: Clip, shape: Body) -> None:
+def _write_extent(stage: Usd.Stage, clip: Clip, shape: BodyMesh) -> None:
     """Write a box onto the SkelRoot that holds the body at every frame."""
     rest = kinematics.rest_position(clip.skeleton)
     reach = float(np.linalg.norm(shape.point_xyz_m - rest[shape.joint_index], axis=-1).max())

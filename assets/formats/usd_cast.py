@@ -9,7 +9,7 @@ from pathlib import Path
 from pxr import Sdf, Usd
 
 from assets.formats import usd, usd_character, usd_lineage
-from assets.formats.usd_character import Copy, Rig
+from assets.formats.usd_character import Copy, UsdRig
 from kernels.types import Clip
 from schemas import usd as contract
 
@@ -17,7 +17,7 @@ from schemas import usd as contract
 def write_cast_stage(
     path: str | Path,
     fitted: Clip,
-    rig: Rig,
+    rig: UsdRig,
     copy: Copy,
     *,
     audio: str | None = None,

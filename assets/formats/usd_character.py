@@ -36,7 +36,7 @@ _UNEVEN = 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class UsdRig:
     """A rig in a USD file.
 
     Parameters
@@ -97,7 +97,7 @@ def split(text: str) -> tuple[str, str]:
     return (found["file"], found["prim"] or "") if found else (text, "")
 
 
-def read_rig(path: str | Path, *, prim: str = "", extra: Mapping[str, str] | None = None) -> Rig:
+def read_rig(path: str | Path, *, prim: str = "", extra: Mapping[str, str] | None = None) -> UsdRig:
     """Read the rig of a character.
 
     Parameters
@@ -108,7 +108,7 @@ def read_rig(path: str | Path, *, prim: str = "", extra: Mapping[str, str] | Non
 
     Returns
     -------
-    Rig
+    UsdRig
 
     Raises
     ------
@@ -143,7 +143,7 @@ def read_rig(path: str | Path, *, prim: str = "", extra: Mapping[str, str] | Non
     return rigs[0]
 
 
-def facts(rig: Rig) -> dict[str, object]:
+def facts(rig: UsdRig) -> dict[str, object]:
     """Say of a rig what its stage's provenance says: its file, prims below the stage's root, joints by part."""
     first = len(rig.character.skeleton.joints) - len(rig.joints)
     return {
@@ -173,7 +173,7 @@ def skeletons(stage: Usd.Stage) -> list[tuple[Usd.Prim, Usd.Prim]]:
     return found
 
 
-def _read(stage: Usd.Stage, name: str, root: Usd.Prim, prim: Usd.Prim, extra: Mapping[str, str] | None) -> Rig:
+def _read(stage: Usd.Stage, name: str, root: Usd.Prim, prim: Usd.Prim, extra: Mapping[str, str] | None) -> UsdRig:
     if prim.IsInstanceProxy():
         raise ValueError("want a skeleton that can be bound to an animation, got one inside an instance; unmake it")
     skeleton = UsdSkel.Skeleton(prim)
@@ -207,7 +207,7 @@ def _read(stage: Usd.Stage, name: str, root: Usd.Prim, prim: Usd.Prim, extra: Ma
             f"want a body of {SHORTEST_M:g} to {TALLEST_M:g} m, got {height_m:.3g} m; say in the file what its unit is "
             "(metersPerUnit), or scale the character"
         )
-    return Rig(
+    return UsdRig(
         name,
         str(above),
         str(root.GetPath()),
@@ -315,12 +315,12 @@ def _upright(names: list[str], parent: Int, placed: Float) -> tuple[Skeleton, in
     )
 
 
-def moves(rig: Rig, fitted: Clip) -> Moves:
+def moves(rig: UsdRig, fitted: Clip) -> Moves:
     """Put a dance that fits a rig's figure on its joints.
 
     Parameters
     ----------
-    rig : Rig
+    rig : UsdRig
     fitted : Clip on ``rig.character.figure``
 
     Returns
@@ -349,13 +349,13 @@ def moves(rig: Rig, fitted: Clip) -> Moves:
     return Moves(rotation.continuous(rotation.normalize(local)), translation, rig.rest_scale, position)
 
 
-def write_cast(layer: Sdf.Layer, rig: Rig, reference: str, moved: Moves) -> None:
+def write_cast(layer: Sdf.Layer, rig: UsdRig, reference: str, moved: Moves) -> None:
     """Make the dance's root prim the character: referenced, stood up in metres, its skeleton bound to the dance.
 
     Parameters
     ----------
     layer : Sdf.Layer of the dance's stage
-    rig : Rig
+    rig : UsdRig
     reference : path of the character's copy, relative to the stage; it need not be there yet
     moved : Moves
     """

@@ -21,12 +21,12 @@ from pxr import Tf, Usd, UsdValidation
 
 from assets.formats import usd_contract, usd_read
 from assets.formats.errors import FormatError
-from assets.formats.usd_contract import Finding
+from assets.formats.usd_contract import StageFinding
 
 _NOT_LOADED = re.compile(r"\b(ModuleNotFoundError|ImportError|No module named)\b")
 
 
-def check(path: str | Path, *, time_limit_s: float = 60.0) -> list[Finding]:
+def check(path: str | Path, *, time_limit_s: float = 60.0) -> list[StageFinding]:
     """Look at any file that claims to be a stage, from a process of its own.
 
     Parameters
@@ -37,7 +37,7 @@ def check(path: str | Path, *, time_limit_s: float = 60.0) -> list[Finding]:
 
     Returns
     -------
-    list of Finding
+    list of StageFinding
         Errors first; empty when all is well. A file that is missing, empty, damaged or no USD gives one finding.
 
     Raises
@@ -52,18 +52,20 @@ def check(path: str | Path, *, time_limit_s: float = 60.0) -> list[Finding]:
         done = subprocess.run(command, capture_output=True, env=environment, timeout=time_limit_s, check=False)
     except subprocess.TimeoutExpired:
         return [
-            Finding("error", "file", "", f"{path}: want a stage, got a file USD read for {time_limit_s:g} s; damaged?")
+            StageFinding(
+                "error", "file", "", f"{path}: want a stage, got a file USD read for {time_limit_s:g} s; damaged?"
+            )
         ]
     try:
-        return [Finding(**finding) for finding in json.loads(done.stdout)]
+        return [StageFinding(**finding) for finding in json.loads(done.stdout)]
     except ValueError:
         last = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         if done.returncode > 0 and _NOT_LOADED.search(last):
             raise ChildProcessError(f"{path}: want it checked, got no validator: {last}; install odori again") from None
-        return [Finding("error", "file", "", f"{path}: want a stage, got a file that crashes USD; it is damaged")]
+        return [StageFinding("error", "file", "", f"{path}: want a stage, got a file that crashes USD; it is damaged")]
 
 
-def inspect(path: str | Path) -> list[Finding]:
+def inspect(path: str | Path) -> list[StageFinding]:
     """Look at a file in this process: for stages one has just written, since damage can take the process down.
 
     Parameters
@@ -72,38 +74,38 @@ def inspect(path: str | Path) -> list[Finding]:
 
     Returns
     -------
-    list of Finding
+    list of StageFinding
         As :func:`check`.
     """
     try:
         stage = usd_read.open_stage(path)
     except FormatError as error:
-        return [Finding("error", "file", "", str(error))]
-    findings: list[Finding] = []
+        return [StageFinding("error", "file", "", str(error))]
+    findings: list[StageFinding] = []
     for rule in (_validators, *usd_contract.RULES):
         try:
             findings.extend(rule(stage))
         except (RuntimeError, TypeError, ValueError) as error:  # USD's own errors are RuntimeErrors
             damage = f"want values USD can read, got a damaged file: {usd_read.reason(error)}"
-            findings.append(Finding("error", "file", "", damage))
+            findings.append(StageFinding("error", "file", "", damage))
     order = ("error", "warning", "note")
     return sorted(set(findings), key=lambda f: (order.index(f.severity), f.rule, f.prim_path, f.sentence))
 
 
-def _validators(stage: Usd.Stage) -> Iterator[Finding]:
+def _validators(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask every validator USD has."""
     try:
         validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     except Tf.ErrorException as failure:
         missing = f"USD's validators: want them loaded, got: {usd_read.reason(failure)}; only our contract was checked"
-        yield Finding("warning", "odori:validators", "", missing)
+        yield StageFinding("warning", "odori:validators", "", missing)
         return
     kinds = UsdValidation.ValidationErrorType
     severity = {kinds.Error: "error", kinds.Warn: "warning", kinds.Info: "note"}
     for error in UsdValidation.ValidationContext(validators).Validate(stage):
         prims = [str(site.GetPrim().GetPath()) for site in error.GetSites() if site.IsValid() and site.GetPrim()]
         where = prims[0] if prims and prims[0] != "/" else ""
-        yield Finding(severity.get(error.GetType(), "note"), str(error.GetIdentifier()), where, error.GetMessage())
+        yield StageFinding(severity.get(error.GetType(), "note"), str(error.GetIdentifier()), where, error.GetMessage())
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ _PLACE_ATOL_M = 1e-4
 
 
 @dataclass(frozen=True)
-class Finding:
+class StageFinding:
     """One thing to say of a stage.
 
     Parameters
@@ -39,7 +39,7 @@ class Finding:
     sentence: str
 
 
-def _stage(stage: Usd.Stage) -> Iterator[Finding]:
+def _stage(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask for axis, unit, rate and range."""
     up = UsdGeom.GetStageUpAxis(stage)
     if not stage.HasAuthoredMetadata("upAxis") or up != contract.UP_AXIS:
@@ -59,7 +59,7 @@ def _stage(stage: Usd.Stage) -> Iterator[Finding]:
         yield _error("range", "", f"startTimeCode, endTimeCode: want 0 and not less, got {span}")
 
 
-def _root(stage: Usd.Stage) -> Iterator[Finding]:
+def _root(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask for a SkelRoot to start from."""
     prim = stage.GetDefaultPrim()
     if not prim or not (prim.IsA(UsdSkel.Root) or _cast(stage)):
@@ -79,7 +79,7 @@ def _root(stage: Usd.Stage) -> Iterator[Finding]:
         yield _warning("extent", str(root.GetPath()), "extent: want one over the whole dance, got none")
 
 
-def _skeleton(stage: Usd.Stage) -> Iterator[Finding]:
+def _skeleton(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask for joints, rest and bind poses, and the animation they are bound to."""
     root = _skel_root(stage)
     if root is None:
@@ -118,7 +118,7 @@ def _skeleton(stage: Usd.Stage) -> Iterator[Finding]:
         yield _error("animation", where, "skel:animationSource: want a SkelAnimation, got none bound")
 
 
-def _rest(stage: Usd.Stage, skeleton: UsdSkel.Skeleton, joints: list[str], where: str) -> Iterator[Finding]:
+def _rest(stage: Usd.Stage, skeleton: UsdSkel.Skeleton, joints: list[str], where: str) -> Iterator[StageFinding]:
     """Ask for a rest pose that is the bind pose, and turns and moves joints only."""
     rest = _matrices(skeleton.GetRestTransformsAttr())
     bind = _matrices(skeleton.GetBindTransformsAttr())
@@ -134,7 +134,7 @@ def _rest(stage: Usd.Stage, skeleton: UsdSkel.Skeleton, joints: list[str], where
         yield _warning("bind", where, f"bindTransforms: want the rest pose in the world, got one {apart_m:.2g} apart")
 
 
-def _animation(stage: Usd.Stage) -> Iterator[Finding]:
+def _animation(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask for the samples of the dance: order, number, times and values."""
     prim, root = _animation_prim(stage), _skel_root(stage)
     if prim is None or root is None:
@@ -167,7 +167,7 @@ def _animation(stage: Usd.Stage) -> Iterator[Finding]:
         yield _warning("scales", where, f"scales: want 1 for every joint, got {_shape(scales)}")
 
 
-def _rotations(quaternion: Float, joints: list[str], where: str) -> Iterator[Finding]:
+def _rotations(quaternion: Float, joints: list[str], where: str) -> Iterator[StageFinding]:
     """Ask for unit length, and no change of sign from sample to sample."""
     length = np.linalg.norm(quaternion, axis=-1)
     if np.abs(length - 1).max() > _UNIT_ATOL:
@@ -180,13 +180,13 @@ def _rotations(quaternion: Float, joints: list[str], where: str) -> Iterator[Fin
         yield _warning("hemisphere", where, f"rotations: want each near the one before, got {got}")
 
 
-def _body(stage: Usd.Stage) -> Iterator[Finding]:
+def _body(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask for a mesh that follows the skeleton; what a character's own file lacks is a warning."""
     for finding in _meshes(stage):
         yield replace(finding, severity="warning") if _cast(stage) else finding
 
 
-def _meshes(stage: Usd.Stage) -> Iterator[Finding]:
+def _meshes(stage: Usd.Stage) -> Iterator[StageFinding]:
     root = _skel_root(stage)
     if root is None:
         return
@@ -214,7 +214,9 @@ def _meshes(stage: Usd.Stage) -> Iterator[Finding]:
         yield from _weights(target, binding, len(points), where)
 
 
-def _weights(target: UsdSkel.SkinningQuery, binding: UsdSkel.Binding, n_points: int, where: str) -> Iterator[Finding]:
+def _weights(
+    target: UsdSkel.SkinningQuery, binding: UsdSkel.Binding, n_points: int, where: str
+) -> Iterator[StageFinding]:
     """Ask for skinning weights: joints that exist, shares that sum to one."""
     if not target.HasJointInfluences():
         yield _error("weights", where, "jointIndices, jointWeights: want both, got none or one")
@@ -239,7 +241,7 @@ def _weights(target: UsdSkel.SkinningQuery, binding: UsdSkel.Binding, n_points: 
         )
 
 
-def _song(stage: Usd.Stage) -> Iterator[Finding]:
+def _song(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask for music that can be found, and that every reader can open."""
     songs = [UsdMedia.SpatialAudio(prim) for prim in stage.Traverse() if prim.IsA(UsdMedia.SpatialAudio)]
     if not songs:
@@ -267,7 +269,7 @@ def _song(stage: Usd.Stage) -> Iterator[Finding]:
             yield _warning("song", where, "startTime: want it left out, since one reader refuses it, got it written")
 
 
-def _provenance(stage: Usd.Stage) -> Iterator[Finding]:
+def _provenance(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask where the dance came from, in words that mean the same on every machine."""
     prim = stage.GetDefaultPrim()
     stored = prim.GetCustomDataByKey(contract.PROVENANCE_KEY) if prim else None
@@ -281,7 +283,7 @@ def _provenance(stage: Usd.Stage) -> Iterator[Finding]:
             yield _error("provenance", where, f"{key}: want nothing that names one machine, got {value}")
 
 
-def _lineage(stage: Usd.Stage) -> Iterator[Finding]:
+def _lineage(stage: Usd.Stage) -> Iterator[StageFinding]:
     """Ask where each frame comes from: none at all in a dance of clips is a warning, half of it an error."""
     prim, root = _animation_prim(stage), stage.GetDefaultPrim()
     if prim is None or not stage.GetEndTimeCode() >= stage.GetStartTimeCode():
@@ -350,12 +352,12 @@ def _animation_prim(stage: Usd.Stage) -> Usd.Prim | None:
     return source if source and source.IsA(UsdSkel.Animation) else None
 
 
-def _error(rule: str, prim_path: str, sentence: str) -> Finding:
-    return Finding("error", f"odori:{rule}", prim_path, sentence)
+def _error(rule: str, prim_path: str, sentence: str) -> StageFinding:
+    return StageFinding("error", f"odori:{rule}", prim_path, sentence)
 
 
-def _warning(rule: str, prim_path: str, sentence: str) -> Finding:
-    return Finding("warning", f"odori:{rule}", prim_path, sentence)
+def _warning(rule: str, prim_path: str, sentence: str) -> StageFinding:
+    return StageFinding("warning", f"odori:{rule}", prim_path, sentence)
 
 
 def _authored(stage: Usd.Stage, key: str) -> str:
@@ -387,7 +389,7 @@ def _span(times: NDArray[np.float64]) -> str:
     return f"{times[0]:g} to {times[-1]:g} ({len(times)})" if len(times) else "none"
 
 
-RULES: tuple[Callable[[Usd.Stage], Iterator[Finding]], ...] = (
+RULES: tuple[Callable[[Usd.Stage], Iterator[StageFinding]], ...] = (
     _stage,
     _root,
     _skeleton,

@@ -19,7 +19,7 @@ AHEAD_S = 0.06
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class HeardIntervals:
     """Strokes and steps in each of K intervals, (K, M) a stream; ``is_banded`` where drums are not told apart."""
 
     drums: Float
@@ -46,7 +46,7 @@ class Heard:
         return log_p + model.weight[1] * (self.melody @ melody.T)
 
 
-def hear(percussion: pa.Table, melody: pa.Table, edge_s: Float, *, symbols: str) -> Heard:
+def hear(percussion: pa.Table, melody: pa.Table, edge_s: Float, *, symbols: str) -> HeardIntervals:
     """Count what sounds between edges.
 
     Parameters
@@ -57,7 +57,7 @@ def hear(percussion: pa.Table, melody: pa.Table, edge_s: Float, *, symbols: str)
 
     Returns
     -------
-    Heard
+    HeardIntervals
         In K intervals; zeros where nothing sounds.
     """
     hits, is_banded = hmm_tables.to_percussion(percussion)
@@ -66,4 +66,4 @@ def hear(percussion: pa.Table, melody: pa.Table, edge_s: Float, *, symbols: str)
     else:
         drums = heard_in(hits.time_s, hits.key_number - FIRST_KEY, edge_s, N_KEYS, ahead_s=AHEAD_S)
     tune = hmm_tables.to_melody(melody)
-    return Heard(drums, heard_in(tune.time_s, tune.symbol, edge_s, len(CONTOUR), ahead_s=AHEAD_S), is_banded)
+    return HeardIntervals(drums, heard_in(tune.time_s, tune.symbol, edge_s, len(CONTOUR), ahead_s=AHEAD_S), is_banded)

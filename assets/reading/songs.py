@@ -40,7 +40,7 @@ class PlayedSong:
         return np.searchsorted(self.grid_s, self.beats.time_s - 1e-9)
 
 
-def heard_song(
+def played_song(
     beats: BeatGrid, duration_s: float, *, feature: pa.Table | None = None, repeat: pa.Table | None = None
 ) -> PlayedSong:
     """Gather what a dance knows of its song.

@@ -22,7 +22,7 @@ from kernels.calibration.calibrate import calibrate
 from kernels.calibration.cleaning import clean
 from kernels.calibration.clip import Gauge, find_gauge, to_clip
 from kernels.calibration.poses import solve_poses
-from kernels.calibration.records import SENSORS, Calibration, Cleaned, Finding, Poses, Recording
+from kernels.calibration.records import SENSORS, BodyPoses, Calibration, Cleaned, Recording, RecordingFinding
 from kernels.calibration.tree_solver import PoseSolver
 from kernels.types import Clip
 from schemas.settings import CalibrationSettings
@@ -45,7 +45,7 @@ class CalibrationError(ValueError):
 
     def __init__(
         self,
-        findings: Iterable[Finding],
+        findings: Iterable[RecordingFinding],
         calibration: Calibration | None = None,
         seconds: Mapping[str, float] | None = None,
     ) -> None:
@@ -77,7 +77,7 @@ class Calibrated:
     suit: Suit
     cleaned: Cleaned
     calibration: Calibration
-    poses: Poses
+    poses: BodyPoses
     gauge: Gauge
     clip: Clip
     warnings: tuple[str, ...] = ()
@@ -182,7 +182,7 @@ def _calibrate(read: Suit, settings: CalibrationSettings, solvers: Solvers | Non
     return Calibrated(whole, cleaned, calibration, poses, gauge, clip, (*read.warnings, *doubts), watch.seconds)
 
 
-def _stop_at(findings: Sequence[Finding], calibration: Calibration | None, watch: _Watch) -> None:
+def _stop_at(findings: Sequence[RecordingFinding], calibration: Calibration | None, watch: _Watch) -> None:
     if any(finding.severity == "error" for finding in findings):
         raise CalibrationError(findings, calibration, watch.seconds)
 
@@ -229,10 +229,12 @@ def in_order(recording: Recording) -> Recording:
             f"sensors: want the {len(SENSORS)} of a suit, got {len(there)} ({', '.join(recording.sensors)}); a body "
             "cannot be calibrated from these, record with the whole suit"
         )
-        raise CalibrationError([Finding("error", None, None, sentence)])
-    errors = [Finding("error", name, None, unknown_sensor(name)) for name in strangers]
+        raise CalibrationError([RecordingFinding("error", None, None, sentence)])
+    errors = [RecordingFinding("error", name, None, unknown_sensor(name)) for name in strangers]
     errors += [
-        Finding("error", name, None, f"sensor {name}: want its rows, got none; switch it on, or name it so in the file")
+        RecordingFinding(
+            "error", name, None, f"sensor {name}: want its rows, got none; switch it on, or name it so in the file"
+        )
         for name in missing
     ]
     if errors:

@@ -14,7 +14,7 @@ NO_SONG = "none"
 
 
 @dataclass(frozen=True)
-class Danced:
+class DancedClip:
     """A clip, and what is said of the song it was danced to."""
 
     clip_id: str
@@ -24,7 +24,7 @@ class Danced:
 
 
 @dataclass(frozen=True)
-class Music:
+class NamedSong:
     """A song as a performance may name it."""
 
     song_id: str
@@ -42,7 +42,7 @@ class Performance:
     paired_by: str
 
 
-def pair(clips: Iterable[Danced], songs: Sequence[Music]) -> tuple[list[Performance], list[str]]:
+def pair(clips: Iterable[DancedClip], songs: Sequence[NamedSong]) -> tuple[list[Performance], list[str]]:
     """Pair clips with songs.
 
     Parameters
@@ -58,7 +58,7 @@ def pair(clips: Iterable[Danced], songs: Sequence[Music]) -> tuple[list[Performa
     troubles : one sentence for each clip whose song is not there
     """
     ordered = sorted(songs, key=lambda song: (song.kind != "midi", song.path))
-    by_name: dict[str, Music] = {}
+    by_name: dict[str, NamedSong] = {}
     for name in (_file_name, lambda song: song.song_id, _stem):
         for song in ordered:
             by_name.setdefault(_spelt(name(song)), song)
@@ -88,9 +88,9 @@ def _spelt(name: str) -> str:
     return unicodedata.normalize("NFC", name.lower())
 
 
-def _file_name(song: Music) -> str:
+def _file_name(song: NamedSong) -> str:
     return PurePosixPath(song.path).name
 
 
-def _stem(song: Music) -> str:
+def _stem(song: NamedSong) -> str:
     return PurePosixPath(song.path).stem

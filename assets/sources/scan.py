@@ -14,7 +14,7 @@ from assets.formats import clips_csv, suit, tree
 from assets.formats.clips_csv import Facts
 from assets.formats.errors import FormatError
 from assets.formats.tree import File, HashCache
-from assets.sources.sources import Clip, Song, Sources
+from assets.sources.sources import ClipFile, SongFile, Sources
 from schemas.keys import clip_key, part_key, part_of, parts_in_use, session_key, song_key
 from schemas.settings import Settings
 
@@ -54,7 +54,7 @@ def scan(studio: Path, limits: Settings, *, sessions_in_use: Iterable[str] = (),
 
 def _clips(
     studio: Path, limits: Settings, known_parts: Mapping[str, int], cache: HashCache, now_ns: int, notes: list[str]
-) -> list[Clip]:
+) -> list[ClipFile]:
     root = studio / "clips"
     files = tree.walk(root, notes)
     said = _said(root, [f for f in files if clips_csv.is_clips_csv(f.name)], notes)
@@ -75,7 +75,7 @@ def _clips(
             digest, problem = ("", problem) if problem else _hashed(root, file, cache, now_ns)
             if not problem and taken.setdefault(key, path) != path:
                 problem = f"want its own key, got {key!r}, which {taken[key]} has; rename one of the two files"
-            clips.append(Clip(key, session, path, "" if problem else digest, _facts_of(said, file), problem))
+            clips.append(ClipFile(key, session, path, "" if problem else digest, _facts_of(said, file), problem))
     notes.extend(note for table in said if (note := table.note()))
     return clips
 
@@ -168,7 +168,7 @@ def _unreadable(file: File, suffixes: tuple[str, ...], largest_mb: float, wanted
     return ""
 
 
-def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int, notes: list[str]) -> list[Song]:
+def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int, notes: list[str]) -> list[SongFile]:
     root = studio / "songs"
     files = tree.walk(root, notes)
     briefs = {f.path for f in files if f.name.endswith(".brief.toml")}
@@ -197,7 +197,7 @@ def _songs(studio: Path, limits: Settings, cache: HashCache, now_ns: int, notes:
         digest, problem = ("", problem) if problem else _hashed(root, file, cache, now_ns)
         brief = next((b for b in (f"{file.path}.brief.toml", _sibling(file, "brief.toml")) if b in briefs), "")
         songs.append(
-            Song(
+            SongFile(
                 key,
                 f"songs/{file.path}",
                 digest,

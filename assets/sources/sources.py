@@ -15,7 +15,7 @@ from typing import Protocol
 from assets.formats import settings, suit, tree
 from assets.formats.clips_csv import Facts
 from assets.formats.errors import FormatError
-from assets.sources.performances import Danced, Music, pair
+from assets.sources.performances import DancedClip, NamedSong, pair
 from schemas.settings import Brief, Settings
 
 FilePath = Path
@@ -23,7 +23,7 @@ FilePath = Path
 
 
 @dataclass(frozen=True)
-class Clip:
+class ClipFile:
     """A motion file of the studio.
 
     Parameters
@@ -49,7 +49,7 @@ class Clip:
 
 
 @dataclass(frozen=True)
-class Song:
+class SongFile:
     """A music file of the studio; ``brief`` is its brief's path, empty when there is none."""
 
     key: str
@@ -64,18 +64,18 @@ class Song:
 class Sources:
     """Everything found under one studio, and what was odd about the folder itself."""
 
-    clips: tuple[Clip, ...]
-    songs: tuple[Song, ...]
+    clips: tuple[ClipFile, ...]
+    songs: tuple[SongFile, ...]
     notes: tuple[str, ...] = ()
 
-    def sessions(self) -> dict[str, tuple[Clip, ...]]:
+    def sessions(self) -> dict[str, tuple[ClipFile, ...]]:
         """Clips by session, both in order."""
-        found: dict[str, list[Clip]] = defaultdict(list)
+        found: dict[str, list[ClipFile]] = defaultdict(list)
         for clip in self.clips:
             found[clip.session].append(clip)
         return {session: tuple(found[session]) for session in sorted(found)}
 
-    def song(self, key: str) -> Song:
+    def song(self, key: str) -> SongFile:
         """Find the song of a key, the readable one where two files want the key.
 
         Parameters
@@ -84,7 +84,7 @@ class Sources:
 
         Returns
         -------
-        Song
+        SongFile
 
         Raises
         ------
@@ -96,9 +96,9 @@ class Sources:
             raise KeyError(key)
         return found[0]
 
-    def songs_by_key(self) -> dict[str, tuple[Song, ...]]:
+    def songs_by_key(self) -> dict[str, tuple[SongFile, ...]]:
         """Songs by key: more than one where two files want it."""
-        found: dict[str, list[Song]] = defaultdict(list)
+        found: dict[str, list[SongFile]] = defaultdict(list)
         for song in self.songs:
             found[song.key].append(song)
         return {key: tuple(found[key]) for key in sorted(found)}
@@ -108,11 +108,11 @@ class Sources:
         """Keys of the songs that clips were danced to."""
         found, _ = pair(
             [
-                Danced(c.key, c.path, c.facts.performed_to, c.facts.performed_offset_s)
+                DancedClip(c.key, c.path, c.facts.performed_to, c.facts.performed_offset_s)
                 for c in self.clips
                 if not c.problem
             ],
-            [Music(s.key, s.path, s.kind) for s in self.songs if not s.problem],
+            [NamedSong(s.key, s.path, s.kind) for s in self.songs if not s.problem],
         )
         return frozenset(one.song_id for one in found)
 
@@ -148,12 +148,12 @@ class Studio(Protocol):
         """Read ``odori.toml``."""
         ...
 
-    def brief(self, song: Song) -> Brief:
+    def brief(self, song: SongFile) -> Brief:
         """Read a song's brief; every default where it has none.
 
         Parameters
         ----------
-        song : Song
+        song : SongFile
 
         Raises
         ------
@@ -186,7 +186,7 @@ def fingerprint(facts: object) -> str:
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def session_version(clips: Iterable[Clip]) -> str:
+def session_version(clips: Iterable[ClipFile]) -> str:
     """Version a session's sources: which files, with which bytes, labelled how.
 
     Parameters
@@ -201,7 +201,7 @@ def session_version(clips: Iterable[Clip]) -> str:
     return fingerprint([[c.path, c.sha256, asdict(c.facts), c.problem] for c in clips])
 
 
-def song_version(songs: Iterable[Song]) -> str:
+def song_version(songs: Iterable[SongFile]) -> str:
     """Version a song's sources.
 
     Parameters
@@ -216,13 +216,13 @@ def song_version(songs: Iterable[Song]) -> str:
     return fingerprint([[s.path, s.sha256, s.problem] for s in songs])
 
 
-def read_brief(studio: Studio, song: Song) -> Brief:
+def read_brief(studio: Studio, song: SongFile) -> Brief:
     """Read the brief a song came with; every default where there is none.
 
     Parameters
     ----------
     studio : Studio
-    song : Song
+    song : SongFile
 
     Raises
     ------
@@ -232,7 +232,7 @@ def read_brief(studio: Studio, song: Song) -> Brief:
     return settings.read_brief(studio.file(song.brief)) if song.brief else Brief()
 
 
-def brief_version(studio: Studio, songs: Iterable[Song]) -> str:
+def brief_version(studio: Studio, songs: Iterable[SongFile]) -> str:
     """Version what the briefs of a song say of its beats, the beats file they name included.
 
     Parameters

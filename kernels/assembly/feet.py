@@ -34,12 +34,12 @@ SAY = 0.25
 
 
 @dataclass(frozen=True)
-class Give:
+class FootLockGive:
     """How far the body gives way to planted feet.
 
     Parameters
     ----------
-    root, foot : grounding.Give, of which the weight of added speed and the time of its changes are used
+    root, foot : grounding.GroundingGive, of which the weight of added speed and the time of its changes are used
     root_pull : float, per square second
         Draws the root's displacement back to nothing.
     foot_pull, free_pull : float, per square second
@@ -51,8 +51,8 @@ class Give:
         Of what a leg has left to stretch, the part that may be taken: a knee keeps most of its bend.
     """
 
-    root: grounding.Give = field(default_factory=grounding.Give)
-    foot: grounding.Give = field(default_factory=lambda: grounding.Give(root_speed_weight=0.005))
+    root: grounding.GroundingGive = field(default_factory=grounding.GroundingGive)
+    foot: grounding.GroundingGive = field(default_factory=lambda: grounding.GroundingGive(root_speed_weight=0.005))
     root_pull: float = 1e-4
     foot_pull: float = 0.02
     free_pull: float = 1.0
@@ -93,14 +93,14 @@ def planted_feet(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -
     return FootContacts(planted[0], planted[1], 0.0, grounding.ANKLE_HEIGHT_M, grounding.TOES_HEIGHT_M)
 
 
-def lock_feet(dance: Dance, planted: FootContacts, *, give: Give | None = None) -> Dance:
+def lock_feet(dance: Dance, planted: FootContacts, *, give: FootLockGive | None = None) -> Dance:
     """Keep planted feet where they stand.
 
     Parameters
     ----------
     dance : Dance on the canonical skeleton
     planted : FootContacts of its frames, from :func:`planted_feet`
-    give : Give, or None for the defaults
+    give : FootLockGive, or None for the defaults
 
     Returns
     -------
@@ -114,7 +114,7 @@ def lock_feet(dance: Dance, planted: FootContacts, *, give: Give | None = None) 
     clips whose stances differ share the difference, each left with its feet a little as the other has them; a
     foot comes home when it is lifted next. The hips rise and sink with the feet so that knees keep their bend.
     """
-    give = Give() if give is None else give
+    give = FootLockGive() if give is None else give
     rate = dance.frame_rate_hz
     is_blend = dance.lineage.blend_weight > 0
     position, orientation = kinematics.forward(CANONICAL, dance.root_xyz_m, dance.rotation_wxyz)
@@ -155,7 +155,7 @@ def lock_feet(dance: Dance, planted: FootContacts, *, give: Give | None = None) 
     return replace(dance, root_xyz_m=place, rotation_wxyz=local, position_xyz_m=position)
 
 
-def _turns_rad(position: Float, planted: FootContacts, is_blend: Bool, rate: float, give: Give) -> Float:
+def _turns_rad(position: Float, planted: FootContacts, is_blend: Bool, rate: float, give: FootLockGive) -> Float:
     """Angles (F, 2) about the vertical that keep flat feet from turning while one clip goes over into the next."""
     foot = position[:, grounding.TOES] - position[:, grounding.ANKLES]
     heading = np.unwrap(np.arctan2(foot[..., 0], foot[..., 2]), axis=0)
@@ -170,7 +170,7 @@ def _turns_rad(position: Float, planted: FootContacts, is_blend: Bool, rate: flo
     return out
 
 
-def _rises_m(height: Float, mask: Bool, is_blend: Bool, rate: float, give: Give) -> Float:
+def _rises_m(height: Float, mask: Bool, is_blend: Bool, rate: float, give: FootLockGive) -> Float:
     """Heights (F, 2) that planted points (2, F, 2) need added in blends, to pass from what they are before to after."""
     at = np.arange(len(is_blend))
     out = np.zeros((len(at), 2))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kernels import rotation
 from kernels.calibration.joints import PairSolution
 from kernels.calibration.pairs import find_swap, pair_costs, pair_residuals, spanning_tree
-from kernels.calibration.records import JOINTS, PARENT, SENSORS, Cleaned, Finding, Severity
+from kernels.calibration.records import JOINTS, PARENT, SENSORS, Cleaned, RecordingFinding, Severity
 from kernels.types import Float
 
 _MOST_FRAMES = 2000
@@ -84,7 +84,7 @@ def move_to_repeat(joint: str) -> str:
     return _MOVES[joint[2:] if joint[:2] in ("l_", "r_") else joint]
 
 
-def find_body_faults(cleaned: Cleaned, pairs: list[PairSolution]) -> tuple[Finding, ...]:
+def find_body_faults(cleaned: Cleaned, pairs: list[PairSolution]) -> tuple[RecordingFinding, ...]:
     """Judge a recording by how its sensors move together.
 
     Parameters
@@ -94,7 +94,7 @@ def find_body_faults(cleaned: Cleaned, pairs: list[PairSolution]) -> tuple[Findi
 
     Returns
     -------
-    tuple of Finding
+    tuple of RecordingFinding
         Rotations written another way come alone: nothing else can be judged then. So do exchanged labels.
     """
     chosen = _frames(cleaned)
@@ -128,7 +128,7 @@ def _median_edge(residual: Float) -> float:
     return float(np.median([residual[k, PARENT[k]] for k in range(1, len(PARENT))]))
 
 
-def _rotation_order(turned: Float, place: Float, residual: Float) -> tuple[Finding, ...]:
+def _rotation_order(turned: Float, place: Float, residual: Float) -> tuple[RecordingFinding, ...]:
     usual = _median_edge(residual)
     step = max(turned.shape[1] // 500, 1)
     for name, change in ORDERS.items():
@@ -139,13 +139,13 @@ def _rotation_order(turned: Float, place: Float, residual: Float) -> tuple[Findi
                 f"{name}: joints are {1000 * usual:.0f} mm apart as given, {1000 * other:.0f} mm that way; "
                 "reorder or invert qw qx qy qz"
             )
-            return (Finding("error", None, None, sentence),)
+            return (RecordingFinding("error", None, None, sentence),)
     return ()
 
 
-def _labels(residual: Float) -> tuple[Finding, ...]:
+def _labels(residual: Float) -> tuple[RecordingFinding, ...]:
     """Find labels that are exchanged: two, and after those two others, as long as that helps."""
-    found: list[Finding] = []
+    found: list[RecordingFinding] = []
     order = np.arange(len(SENSORS))
     while len(found) < _MOST_SWAPS:
         a, b, ratio = find_swap(residual[np.ix_(order, order)], PARENT)
@@ -156,12 +156,12 @@ def _labels(residual: Float) -> tuple[Finding, ...]:
             f"{one}, {other}: want each sensor on its own segment, got two that fit exchanged (joints {1 / ratio:.1f} "
             f"times closer); {'then ' if found else ''}exchange the labels {one} and {other}"
         )
-        found.append(Finding("error", one, None, sentence))
+        found.append(RecordingFinding("error", one, None, sentence))
         order[[a, b]] = order[[b, a]]
     return tuple(found)
 
 
-def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]) -> tuple[Finding, ...]:
+def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]) -> tuple[RecordingFinding, ...]:
     """Whole limbs on the wrong side fit as well as before; only the body's shape tells."""
     q = cleaned.recording.rotation_wxyz[chosen]
     p = cleaned.recording.position_xyz_m[chosen]
@@ -194,10 +194,10 @@ def _sides(cleaned: Cleaned, pairs: list[PairSolution], chosen: NDArray[np.intp]
     sentence = f"{sensor}: want left sensors on the left, got {got}; exchange l_ and r_ of {what}"
     if sensor == "l_shoulder" and legs in what:
         sentence += ", or, if the labels are right, set the tracker's hemisphere: every position is mirrored"
-    return (Finding("error", sensor, None, sentence),)
+    return (RecordingFinding("error", sensor, None, sentence),)
 
 
-def _tree(residual: Float, edges: list[tuple[int, int]]) -> tuple[Finding, ...]:
+def _tree(residual: Float, edges: list[tuple[int, int]]) -> tuple[RecordingFinding, ...]:
     found = []
     for k in range(1, len(PARENT)):
         if (PARENT[k], k) in edges:
@@ -210,11 +210,11 @@ def _tree(residual: Float, edges: list[tuple[int, int]]) -> tuple[Finding, ...]:
                 f"{SENSORS[k]}: want it to hang from {SENSORS[PARENT[k]]}, got a motion that fits {SENSORS[best]} "
                 f"better ({1000 * residual[k, best]:.0f} against {1000 * given:.0f} mm); check labels and straps"
             )
-            found.append(Finding("warning", SENSORS[k], None, sentence))
+            found.append(RecordingFinding("warning", SENSORS[k], None, sentence))
     return tuple(found)
 
 
-def _loose(pairs: list[PairSolution]) -> list[Finding]:
+def _loose(pairs: list[PairSolution]) -> list[RecordingFinding]:
     """Sensors that do not move with the body they are said to be on."""
     found = []
     for name, above, pair in zip(JOINTS, PARENT[1:], pairs, strict=True):
@@ -226,11 +226,11 @@ def _loose(pairs: list[PairSolution]) -> list[Finding]:
             f"between what the two say of it; check the straps and labels of {name} and {SENSORS[above]}, and record "
             "again"
         )
-        found.append(Finding(severity, name, None, sentence))
+        found.append(RecordingFinding(severity, name, None, sentence))
     return found
 
 
-def _movement(pairs: list[PairSolution]) -> list[Finding]:
+def _movement(pairs: list[PairSolution]) -> list[RecordingFinding]:
     found = []
     for name, pair in zip(JOINTS, pairs, strict=True):
         n = int((pair.weight > 0).sum())
@@ -239,25 +239,25 @@ def _movement(pairs: list[PairSolution]) -> list[Finding]:
             sentence = (
                 f"{name}: want at least {_ENOUGH_FRAMES} frames with its two sensors good, got {n}; record longer"
             )
-            found.append(Finding("error", name, None, sentence))
+            found.append(RecordingFinding("error", name, None, sentence))
         elif pair.rank < 2:
             sentence = (
                 f"{name}: want it moved about at least two axes, got {degrees[1]:.1f} degrees about the second: joint "
                 f"{name} did not move enough; {move_to_repeat(name)}, then record again"
             )
-            found.append(Finding("error", name, None, sentence))
+            found.append(RecordingFinding("error", name, None, sentence))
         elif pair.rank == 2:
             sentence = (
                 f"{name}: want it moved about every axis, got {degrees[2]:.1f} degrees about the weakest: its place "
                 f"along the hinge is not seen and was set midway between the sensors; {move_to_repeat(name)}"
             )
-            found.append(Finding("warning", name, None, sentence))
+            found.append(RecordingFinding("warning", name, None, sentence))
         elif n < _GOOD_FRAMES:
             sentence = (
                 f"{name}: want {_GOOD_FRAMES} frames or more with its two sensors good, got {n}: lengths will be "
                 "rough; record longer"
             )
-            found.append(Finding("warning", name, None, sentence))
+            found.append(RecordingFinding("warning", name, None, sentence))
     return found
 
 

@@ -20,7 +20,7 @@ from kernels.calibration.gaps import aligned, bridge
 from kernels.calibration.hampel import find_outliers, median_where
 from kernels.calibration.hemispheres import undo_hemispheres
 from kernels.calibration.joint_outliers import judge_by_joints
-from kernels.calibration.records import SENSORS, Bools, Cleaned, Finding, Recording
+from kernels.calibration.records import SENSORS, Bools, Cleaned, Recording, RecordingFinding
 from kernels.calibration.silence import find_silent
 from kernels.types import Float
 
@@ -138,7 +138,7 @@ def _is_finite(recording: Recording) -> Bools:
     return np.asarray(finite)
 
 
-def _outlier_findings(recording: Recording, is_usable: Bools, is_outlier: Bools) -> list[Finding]:
+def _outlier_findings(recording: Recording, is_usable: Bools, is_outlier: Bools) -> list[RecordingFinding]:
     findings = []
     n: NDArray[np.int64] = is_usable.sum(axis=0)
     for s, sensor in enumerate(recording.sensors):
@@ -149,5 +149,5 @@ def _outlier_findings(recording: Recording, is_usable: Bools, is_outlier: Bools)
                 f"{sensor}: want at most {_MAX_OUTLIER_RATIO:.0%} outliers, got {share:.1%}, the first at frame {first}"
                 "; look for a loose strap, a bad cable, or metal near the sensor"
             )
-            findings.append(Finding("warning", sensor, first, sentence))
+            findings.append(RecordingFinding("warning", sensor, first, sentence))
     return findings

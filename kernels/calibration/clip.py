@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kernels import rotation
-from kernels.calibration.records import PARENT, SENSORS, Poses
+from kernels.calibration.records import PARENT, SENSORS, BodyPoses
 from kernels.skeleton.kinematics import to_local
 from kernels.skeleton.naming import END_SUFFIX
 from kernels.types import Clip, Float, Skeleton
@@ -54,12 +54,12 @@ class Gauge:
     rest_wxyz: Float
 
 
-def find_gauge(poses: Poses, frame_rate_hz: float) -> Gauge:
+def find_gauge(poses: BodyPoses, frame_rate_hz: float) -> Gauge:
     """Find which way is up, and the rest pose.
 
     Parameters
     ----------
-    poses : Poses of F >= 1 frames
+    poses : BodyPoses of F >= 1 frames
     frame_rate_hz : float, > 0
 
     Returns
@@ -85,12 +85,12 @@ def find_gauge(poses: Poses, frame_rate_hz: float) -> Gauge:
     return Gauge(turn, first, end, rotation.mul(_ahead(float(left[0]), float(left[2])), middle))
 
 
-def to_clip(poses: Poses, frame_rate_hz: float, *, gauge: Gauge | None = None) -> Clip:
+def to_clip(poses: BodyPoses, frame_rate_hz: float, *, gauge: Gauge | None = None) -> Clip:
     """Put solved poses on a skeleton of 17 joints and 5 ends.
 
     Parameters
     ----------
-    poses : Poses of F >= 1 frames
+    poses : BodyPoses of F >= 1 frames
     frame_rate_hz : float, > 0
     gauge : Gauge, or None to find it
 
@@ -126,7 +126,7 @@ def to_clip(poses: Poses, frame_rate_hz: float, *, gauge: Gauge | None = None) -
     return Clip(skeleton, frame_rate_hz, place[:, 0], to_local(skeleton, whole))
 
 
-def _rest_window(poses: Poses, up: Float, frame_rate_hz: float) -> tuple[int, int]:
+def _rest_window(poses: BodyPoses, up: Float, frame_rate_hz: float) -> tuple[int, int]:
     """Find the half second in which the body stands straightest and stillest; of equal ones the first."""
     at = {name: k for k, name in enumerate(poses.joints)}
     p = poses.position_xyz_m

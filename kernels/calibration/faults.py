@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.calibration.records import SENSORS, Bools, Finding, Recording
+from kernels.calibration.records import SENSORS, Bools, Recording, RecordingFinding
 
 MIN_FRAMES = 240
 """Frames of a recording. Measured on made-up recordings: with 120 frames some bone lengths are off by any amount."""
@@ -22,7 +22,7 @@ _UNITS = (
 )
 
 
-def check_recording(recording: Recording) -> tuple[Finding, ...]:
+def check_recording(recording: Recording) -> tuple[RecordingFinding, ...]:
     """Judge the sensors and the values of a recording.
 
     Parameters
@@ -31,7 +31,7 @@ def check_recording(recording: Recording) -> tuple[Finding, ...]:
 
     Returns
     -------
-    tuple of Finding
+    tuple of RecordingFinding
         Empty where nothing is wrong.
     """
     finite_p = np.isfinite(recording.position_xyz_m).all(-1)
@@ -48,7 +48,7 @@ def check_recording(recording: Recording) -> tuple[Finding, ...]:
     )
 
 
-def check_sensors(sensors: tuple[str, ...]) -> tuple[Finding, ...]:
+def check_sensors(sensors: tuple[str, ...]) -> tuple[RecordingFinding, ...]:
     """Find which of the 17 sensors are missing, and which names are none of theirs.
 
     Parameters
@@ -57,7 +57,7 @@ def check_sensors(sensors: tuple[str, ...]) -> tuple[Finding, ...]:
 
     Returns
     -------
-    tuple of Finding
+    tuple of RecordingFinding
         An error each.
     """
     missing = [name for name in SENSORS if name not in sensors]
@@ -66,7 +66,7 @@ def check_sensors(sensors: tuple[str, ...]) -> tuple[Finding, ...]:
     hint = f"; {', '.join(unknown)} may be meant" if unknown else ""
     for name in missing:
         found.append(
-            Finding(
+            RecordingFinding(
                 "error",
                 name,
                 None,
@@ -75,7 +75,7 @@ def check_sensors(sensors: tuple[str, ...]) -> tuple[Finding, ...]:
         )
     for name in unknown:
         found.append(
-            Finding(
+            RecordingFinding(
                 "error",
                 name,
                 None,
@@ -85,19 +85,19 @@ def check_sensors(sensors: tuple[str, ...]) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-def _sensors(recording: Recording) -> tuple[Finding, ...]:
+def _sensors(recording: Recording) -> tuple[RecordingFinding, ...]:
     return check_sensors(recording.sensors)
 
 
-def _frames(recording: Recording) -> list[Finding]:
+def _frames(recording: Recording) -> list[RecordingFinding]:
     f = recording.n_frames
     if f >= MIN_FRAMES:
         return []
     sentence = f"recording: want at least {MIN_FRAMES} frames, got {f}; record a minute or more of whole-body movement"
-    return [Finding("error", None, None, sentence)]
+    return [RecordingFinding("error", None, None, sentence)]
 
 
-def _not_finite(recording: Recording, is_finite: Bools) -> list[Finding]:
+def _not_finite(recording: Recording, is_finite: Bools) -> list[RecordingFinding]:
     wrong = recording.is_valid & ~is_finite
     if not wrong.any():
         return []
@@ -107,10 +107,10 @@ def _not_finite(recording: Recording, is_finite: Bools) -> list[Finding]:
         f"{name}: want finite numbers where an entry is valid, got NaN or infinity at frame {frame} and in "
         f"{int(wrong.sum())} valid entries altogether; mark lost entries is_valid = false"
     )
-    return [Finding("error", name, frame, sentence)]
+    return [RecordingFinding("error", name, frame, sentence)]
 
 
-def _not_unit(recording: Recording, is_usable: Bools) -> list[Finding]:
+def _not_unit(recording: Recording, is_usable: Bools) -> list[RecordingFinding]:
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.sqrt(np.sum(recording.rotation_wxyz**2, axis=-1))
     off = np.where(is_usable, np.abs(length - 1.0), 0.0)
@@ -123,11 +123,11 @@ def _not_unit(recording: Recording, is_usable: Bools) -> list[Finding]:
         frame = int(np.flatnonzero(off[:, s] > limit)[0])
         what = f"{name}: want unit quaternions, got one of length {length[frame, s]:.4f} at frame {frame}"
         cure = "check the columns qw qx qy qz" if severity == "error" else "it was made unit; export more decimals"
-        found.append(Finding("error" if severity == "error" else "warning", name, frame, f"{what}; {cure}"))
+        found.append(RecordingFinding("error" if severity == "error" else "warning", name, frame, f"{what}; {cure}"))
     return found
 
 
-def _units(recording: Recording, is_usable: Bools) -> list[Finding]:
+def _units(recording: Recording, is_usable: Bools) -> list[RecordingFinding]:
     if recording.n_frames == 0 or len(recording.sensors) < len(SENSORS):
         return []
     step = max(recording.n_frames // 300, 1)
@@ -146,10 +146,10 @@ def _units(recording: Recording, is_usable: Bools) -> list[Finding]:
         else "check the unit of px_m py_m pz_m, and that one body wears all sensors"
     )
     sentence = f"recording: want metres, sensors 0.5 to 3 m apart, got {reach:.4g} between the farthest two; {cure}"
-    return [Finding("error", None, None, sentence)]
+    return [RecordingFinding("error", None, None, sentence)]
 
 
-def _dropped(recording: Recording, is_usable: Bools) -> list[Finding]:
+def _dropped(recording: Recording, is_usable: Bools) -> list[RecordingFinding]:
     found = []
     for s, name in enumerate(recording.sensors):
         share = 1.0 - float(is_usable[:, s].mean()) if recording.n_frames else 0.0
@@ -159,5 +159,5 @@ def _dropped(recording: Recording, is_usable: Bools) -> list[Finding]:
                 f"{name}: want at most {_MAX_DROPPED_RATIO:.0%} of frames lost, got {share:.1%}, the first at frame "
                 f"{frame}; check its cable and its distance from the source, and record again"
             )
-            found.append(Finding("error", name, frame, sentence))
+            found.append(RecordingFinding("error", name, frame, sentence))
     return found

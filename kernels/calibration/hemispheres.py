@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.calibration.records import Bools, Finding
+from kernels.calibration.records import Bools, RecordingFinding
 from kernels.types import Float
 
 _WINDOW = 5
@@ -32,7 +32,7 @@ _GLANCES = 400
 
 def undo_hemispheres(
     position_xyz_m: Float, is_usable: Bools, *, sensors: tuple[str, ...]
-) -> tuple[Float, list[Finding]]:
+) -> tuple[Float, list[RecordingFinding]]:
     """Find where a sensor jumps to the opposite place and turn it back.
 
     Parameters
@@ -44,7 +44,7 @@ def undo_hemispheres(
     Returns
     -------
     position_xyz_m : (F, S, 3) float64
-    findings : list of Finding
+    findings : list of RecordingFinding
         A warning for each sensor that was turned back, with the first mirrored frame; an error where it cannot be told
         which half of the recording is mirrored.
 
@@ -56,7 +56,7 @@ def undo_hemispheres(
     mirrored where it would lie less than half as far from them.
     """
     turned = np.array(position_xyz_m, np.float64)
-    findings: list[Finding] = []
+    findings: list[RecordingFinding] = []
     signs = np.ones(is_usable.shape)
     for s in range(len(sensors)):
         signs[:, s] = _signs(turned[:, s], is_usable[:, s])
@@ -79,10 +79,10 @@ def undo_hemispheres(
         )
         if away[0] > _TELLING * away[1] and is_jumping[s]:
             cure = "which ones cannot be told so near the source; set the tracker's hemisphere and record again"
-            findings.append(Finding("error", name, frame, f"{what}; {cure}"))
+            findings.append(RecordingFinding("error", name, frame, f"{what}; {cure}"))
         else:
             cure = "they were turned back; set the tracker's hemisphere, or stay on one side of the source"
-            findings.append(Finding("warning", name, frame, f"{what}; {cure}"))
+            findings.append(RecordingFinding("warning", name, frame, f"{what}; {cure}"))
     return turned, findings
 
 

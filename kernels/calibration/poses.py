@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from kernels import rotation
-from kernels.calibration.records import PARENT, SENSORS, Calibration, Cleaned, Poses
+from kernels.calibration.records import PARENT, SENSORS, BodyPoses, Calibration, Cleaned
 from kernels.calibration.springs import relax_springs
 from kernels.calibration.tree_solver import FILLED_WEIGHT, BodyModel, PoseSolver, Stream, make_model, solve_tree
 from kernels.types import Float
@@ -22,7 +22,7 @@ def solve_poses(
     method: Method = "gauss_newton",
     iterations: int | None = None,
     device: PoseSolver | None = None,
-) -> Poses:
+) -> BodyPoses:
     """Bring the bones of a calibrated body to where their sensors are.
 
     Parameters
@@ -37,7 +37,7 @@ def solve_poses(
 
     Returns
     -------
-    Poses
+    BodyPoses
         Empty where F is 0.
 
     Raises
@@ -59,7 +59,7 @@ def solve_poses(
     after = gaps(model, position, solved.rotation_wxyz)
     centre = position.copy()
     centre[:, 0] += rotation.apply(solved.rotation_wxyz[:, 0], hip_centre(model))
-    return Poses(SENSORS, centre, solved.rotation_wxyz, before, after)
+    return BodyPoses(SENSORS, centre, solved.rotation_wxyz, before, after)
 
 
 def body_model(calibration: Calibration) -> BodyModel:

@@ -41,7 +41,7 @@ Severity = Literal["error", "warning"]
 
 
 @dataclass(frozen=True)
-class Finding:
+class RecordingFinding:
     """Something wrong or doubtful in a recording.
 
     Parameters
@@ -123,7 +123,7 @@ class Cleaned:
         Share of the noise's power that the low-pass leaves.
     n_outliers : (S,) int64
         Entries judged outliers.
-    findings : Finding each
+    findings : RecordingFinding each
     """
 
     recording: Recording
@@ -132,7 +132,7 @@ class Cleaned:
     rotation_noise_rad: Float
     noise_gain: float
     n_outliers: NDArray[np.int64]
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[RecordingFinding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,14 +187,14 @@ class Calibration:
     Parameters
     ----------
     joints : JointEstimate each, in the order of :data:`JOINTS`
-    findings : Finding each
+    findings : RecordingFinding each
         Those of cleaning included.
     residual_m : (F, 16) float64, metres
         Distance between each joint as carried by either sensor, frame by frame.
     """
 
     joints: tuple[JointEstimate, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[RecordingFinding, ...]
     residual_m: Float = field(default_factory=lambda: np.zeros((0, len(JOINTS))))
 
     @property
@@ -209,7 +209,7 @@ class Calibration:
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
+class BodyPoses:
     """A body closed at its joints, frame by frame.
 
     Parameters

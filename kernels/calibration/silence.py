@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kernels.calibration.records import Bools, Finding, Recording
+from kernels.calibration.records import Bools, Recording, RecordingFinding
 from kernels.types import Float
 
 _LEAST_S = 0.25
@@ -16,7 +16,7 @@ _MOVED_M = 0.05
 _CURE = "they count as not heard; check its cable and its distance from the source"
 
 
-def find_silent(recording: Recording) -> tuple[Bools, list[Finding]]:
+def find_silent(recording: Recording) -> tuple[Bools, list[RecordingFinding]]:
     """Find entries that are called valid but hold no reading.
 
     Parameters
@@ -28,7 +28,7 @@ def find_silent(recording: Recording) -> tuple[Bools, list[Finding]]:
     (F, S) bool
         Positions of exactly zero, which is inside the source; and readings that repeat the one before to the last bit
         for a quarter of a second or more while the other sensors moved by 5 cm, in the median.
-    findings : list of Finding
+    findings : list of RecordingFinding
         A warning for each kind, about the first sensor.
     """
     position, turned = recording.position_xyz_m, recording.rotation_wxyz
@@ -48,7 +48,7 @@ def find_silent(recording: Recording) -> tuple[Bools, list[Finding]]:
     ]
 
 
-def _told(recording: Recording, is_silent: Bools, what: str) -> list[Finding]:
+def _told(recording: Recording, is_silent: Bools, what: str) -> list[RecordingFinding]:
     silent = np.flatnonzero(is_silent.any(axis=0))
     if len(silent) == 0:
         return []
@@ -58,7 +58,7 @@ def _told(recording: Recording, is_silent: Bools, what: str) -> list[Finding]:
         f"{name}: want new readings while the body moves, got {what} in {int(is_silent[:, silent[0]].sum())} frames "
         f"from frame {frame} on{others}; {_CURE}"
     )
-    return [Finding("warning", name, frame, sentence)]
+    return [RecordingFinding("warning", name, frame, sentence)]
 
 
 def _moved(position: Float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.graph.costs import PathCosts, is_within, rough_cost, usage_cost, warp_cost, weight_scale
-from kernels.graph.program import Move, Program, StepPrice
+from kernels.graph.program import Move, PathProgram, StepPrice
 from kernels.graph.repetition import spread
 from kernels.types import Choreography, Float, Int, MotionGraph
 
@@ -185,7 +185,7 @@ def find_path(
         step_price=step_price,
     )
     for bounds, price in ((costs.hard_ratio, 0.0), (costs.last_resort_ratio, most)):
-        program = Program(
+        program = PathProgram(
             graph,
             beat_s,
             steps=steps,
@@ -201,7 +201,7 @@ def find_path(
         if len(start) and np.isfinite(whole.start[0][start]).any():
             moves = program.decode(whole, first=0, last=n_beats, arrived=None, starts=start)
 
-            def total(candidate: list[Move], program: Program = program) -> float:
+            def total(candidate: list[Move], program: PathProgram = program) -> float:
                 path = _evaluate(program, candidate, costs, graph)
                 return path.total_cost + most * int(path.is_outside.sum())
 
@@ -297,7 +297,7 @@ def more_than_any(
     return most
 
 
-def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, graph: MotionGraph) -> Path:
+def _evaluate(program: PathProgram | None, moves: list[Move], costs: PathCosts, graph: MotionGraph) -> Path:
     """Price a row of moves step by step."""
     beat, source, kind = (np.array([move[i] for move in moves], np.int64) for i in range(3))
     if program is None or not moves:
@@ -338,7 +338,7 @@ def _evaluate(program: Program | None, moves: list[Move], costs: PathCosts, grap
     )
 
 
-def _explain(program: Program, start: Int, bounds: tuple[float, float]) -> InfeasiblePathError:
+def _explain(program: PathProgram, start: Int, bounds: tuple[float, float]) -> InfeasiblePathError:
     """Say where and why no dance goes on, and what would help."""
     beat = program.furthest(start)
     time_s, last = float(program.beat_s[beat]), program.n_beats
@@ -359,7 +359,7 @@ def _explain(program: Program, start: Int, bounds: tuple[float, float]) -> Infea
     return InfeasiblePathError(beat_index=beat, time_s=time_s, reason=reason, message=f"{where}: {why}")
 
 
-def _tempo(program: Program, beat: int, bounds: tuple[float, float]) -> str:
+def _tempo(program: PathProgram, beat: int, bounds: tuple[float, float]) -> str:
     """Compare the song's beats with what the clips can cover."""
     spans = []
     for (m, d), clip_s in zip(program.steps, program.clip_s, strict=True):

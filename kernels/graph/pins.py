@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from kernels.graph.costs import PathCosts
 from kernels.graph.path import STEPS
-from kernels.graph.program import Program, StepPrice
+from kernels.graph.program import PathProgram, StepPrice
 from kernels.types import Float, Int, MotionGraph
 
 Mask = NDArray[np.bool_]
@@ -195,7 +195,7 @@ class Reach:
         self._allowed = np.ones(len(graph.clip_index), bool) if allowed is None else allowed
         self.n_intervals, self.n_nodes = len(beat_s) - 1, len(graph.clip_index)
         for self.bounds in (costs.hard_ratio, costs.last_resort_ratio):
-            program = Program(
+            program = PathProgram(
                 graph, beat_s, steps=steps, costs=costs, admissible=None, bounds=self.bounds, outside_price=0.0
             )
             self._source, self._target, self._end = graph.source, graph.target, program.end
@@ -204,7 +204,7 @@ class Reach:
             if self.is_danceable:
                 break
 
-    def _fit(self, program: Program, beat: int, kind: int) -> Mask | None:
+    def _fit(self, program: PathProgram, beat: int, kind: int) -> Mask | None:
         cost = program.step_cost(beat, kind)
         return None if cost is None else np.isfinite(cost) & self._allowed
 

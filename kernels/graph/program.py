@@ -71,7 +71,7 @@ def step_ends(graph: MotionGraph, steps: Sequence[tuple[int, int]]) -> list[Int]
     return ends
 
 
-class Program:
+class PathProgram:
     """A graph, a song and prices, made ready.
 
     Parameters

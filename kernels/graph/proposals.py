@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.program import Program, Solution
+from kernels.graph.program import PathProgram, Solution
 from kernels.types import Float, Int
 
 Mask = NDArray[np.bool_]
@@ -23,7 +23,7 @@ class Proposals:
 
     Parameters
     ----------
-    program : Program of K music intervals and N nodes, with all that is fixed (pins, bounds, prices)
+    program : PathProgram of K music intervals and N nodes, with all that is fixed (pins, bounds, prices)
     starts : (M,) int64, nodes that may begin
 
     Notes
@@ -32,7 +32,7 @@ class Proposals:
     prices are those of :func:`kernels.graph.path.find_path`.
     """
 
-    def __init__(self, program: Program, starts: Int) -> None:
+    def __init__(self, program: PathProgram, starts: Int) -> None:
         self._program, self._starts = program, starts
         n = program.n_beats
         self._whole: Solution = program.solve(0, n, after={n: program.at_the_end})

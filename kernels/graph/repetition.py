@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kernels.graph.program import Move, Program, Solution
+from kernels.graph.program import Move, PathProgram, Solution
 from kernels.types import Int
 
 WINDOWS = (12, 6)
@@ -22,7 +22,7 @@ half a window after the one before. Chosen by hand; measured on 124 small random
 
 
 def spread(
-    program: Program,
+    program: PathProgram,
     whole: Solution,
     moves: list[Move],
     starts: Int,
@@ -33,7 +33,7 @@ def spread(
 
     Parameters
     ----------
-    program : Program
+    program : PathProgram
     whole : Solution over all beats, without prices
     moves : the dance decoded from it: optimal but for repetition
     starts : (M,) int64, nodes that may begin
@@ -77,7 +77,7 @@ def spread(
     return best
 
 
-def _sweep(program: Program, moves: list[Move], starts: Int, total: Callable[[list[Move]], float]) -> list[Move]:
+def _sweep(program: PathProgram, moves: list[Move], starts: Int, total: Callable[[list[Move]], float]) -> list[Move]:
     """Mend all windows, wide ones first."""
     cost = total(moves)
     for window in WINDOWS:
@@ -88,12 +88,12 @@ def _sweep(program: Program, moves: list[Move], starts: Int, total: Callable[[li
     return moves
 
 
-def _uses(program: Program, moves: list[Move]) -> Int:
+def _uses(program: PathProgram, moves: list[Move]) -> Int:
     """How often each stretch is danced, (N,) by its first node."""
     return np.bincount(program.stretches(moves)[0], minlength=program.n_nodes)
 
 
-def _make_forwards(program: Program, whole: Solution, starts: Int) -> list[Move]:
+def _make_forwards(program: PathProgram, whole: Solution, starts: Int) -> list[Move]:
     moves: list[Move] = []
     beat = 0
     arrived: tuple[int, int] | None = None
@@ -113,7 +113,7 @@ def _make_forwards(program: Program, whole: Solution, starts: Int) -> list[Move]
     return moves
 
 
-def _mend(program: Program, moves: list[Move], begin: int, end: int, starts: Int) -> list[Move] | None:
+def _mend(program: PathProgram, moves: list[Move], begin: int, end: int, starts: Int) -> list[Move] | None:
     """Solve one window again, the rest of the dance as it is; None where there is nothing to gain."""
     beats = np.array([beat for beat, _, _ in moves] + [program.n_beats])
     low = int(np.searchsorted(beats, begin))
@@ -135,7 +135,7 @@ def _mend(program: Program, moves: list[Move], begin: int, end: int, starts: Int
     return moves[:low] + new + moves[high:]
 
 
-def _to_next_transition(program: Program, moves: list[Move], index: int) -> int | None:
+def _to_next_transition(program: PathProgram, moves: list[Move], index: int) -> int | None:
     """Music beats from a move's start to the next transition after it; None where none follows."""
     for before, after in itertools.pairwise(moves[index:]):
         if program.ends(before)[1] != after[1]:

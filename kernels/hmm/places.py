@@ -125,7 +125,7 @@ def crowded_cost(grid_s: Float, end_s: float, *, blend_s: float) -> Float:
 
 
 @dataclass(frozen=True, eq=False)
-class Wish:
+class MotionWish:
     """In the intervals first <= k < last only motions of the (I,) mask are wished for."""
 
     first: int
@@ -144,7 +144,7 @@ class Wish:
         )
 
 
-def keep_wishes(places: Places, wishes: Sequence[Wish], *, price: float = np.inf) -> Places:
+def keep_wishes(places: Places, wishes: Sequence[MotionWish], *, price: float = np.inf) -> Places:
     """Price what wishes do not admit, each interval; at an infinite price it is not danced at all.
 
     Parameters

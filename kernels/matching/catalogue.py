@@ -67,7 +67,7 @@ class Chunk(Generic[TablesT]):
         return Chunk(self.first, self.clips[:half]), Chunk(self.first + half, self.clips[half:])
 
 
-class Catalogue(Generic[TablesT]):
+class MatchCatalogue(Generic[TablesT]):
     """A catalogue prepared for many songs; made by the ``index`` of a search.
 
     Parameters
@@ -86,7 +86,7 @@ class Catalogue(Generic[TablesT]):
         return sum(len(chunk.clips) for chunk in self.chunks)
 
 
-class Song:
+class SongLayout:
     """Segments laid out once for all chunks.
 
     Parameters
@@ -217,7 +217,7 @@ def check_search(
     Parameters
     ----------
     segments : sequence of arrays, to be (L,) float with L >= 1, finite, >= 0
-    clips : a Catalogue made for the same scales, or anything else, which is left alone
+    clips : a MatchCatalogue made for the same scales, or anything else, which is left alone
     k : int, to be >= 1
     fiftieths : the scales times 50
     floors : one a segment, or None
@@ -235,7 +235,7 @@ def check_search(
     check_query(segments, k=k)
     if floors is not None and len(floors) != len(segments):
         raise ValueError(f"floors: want one a segment, {len(segments)}, got {len(floors)}")
-    if isinstance(clips, Catalogue) and clips.fiftieths != fiftieths:
+    if isinstance(clips, MatchCatalogue) and clips.fiftieths != fiftieths:
         scales = tuple(p / SCALE_DENOMINATOR for p in fiftieths)
         raise ValueError(f"clips: want an index for the scales {scales}, got one for others; make it anew")
     return np.full(len(segments), -1.0) if floors is None else np.asarray(floors, np.float64)

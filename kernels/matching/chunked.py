@@ -9,7 +9,7 @@ from typing import Generic
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.matching.catalogue import Catalogue, Chunk, Series, Song, TablesT, check_search
+from kernels.matching.catalogue import Chunk, MatchCatalogue, Series, SongLayout, TablesT, check_search
 from kernels.matching.score import SCALES, Match, merge_matches, numerators
 
 MEMORY_BYTES = 2**31
@@ -35,7 +35,7 @@ class ChunkedSearch(ABC, Generic[TablesT]):
             raise ValueError(f"memory_bytes: want > 0, got {memory_bytes}")
         self.memory_bytes = memory_bytes
 
-    def index(self, clips: Iterable[Series], *, scales: Sequence[float] = SCALES) -> Catalogue[TablesT]:
+    def index(self, clips: Iterable[Series], *, scales: Sequence[float] = SCALES) -> MatchCatalogue[TablesT]:
         """Prepare a catalogue for many songs.
 
         Parameters
@@ -45,7 +45,7 @@ class ChunkedSearch(ABC, Generic[TablesT]):
 
         Returns
         -------
-        Catalogue
+        MatchCatalogue
             Its tables are built by the first search and kept if all fit into the memory allowed; else they are built
             anew, chunk by chunk, by every search.
 
@@ -56,12 +56,12 @@ class ChunkedSearch(ABC, Generic[TablesT]):
         """
         fiftieths = numerators(scales)
         chunks = list(self._chunks(clips, fiftieths, n_segments=0))
-        return Catalogue(chunks, fiftieths=fiftieths, is_resident=len(chunks) <= 1)
+        return MatchCatalogue(chunks, fiftieths=fiftieths, is_resident=len(chunks) <= 1)
 
     def matches(
         self,
         segments: Sequence[Series],
-        clips: Iterable[Series] | Catalogue[TablesT],
+        clips: Iterable[Series] | MatchCatalogue[TablesT],
         *,
         k: int,
         scales: Sequence[float] = SCALES,
@@ -98,9 +98,9 @@ class ChunkedSearch(ABC, Generic[TablesT]):
         found: list[list[Match]] = [[] for _ in segments]
         if not segments:
             return found
-        song = Song(segments, k=k, fiftieths=fiftieths)
+        song = SongLayout(segments, k=k, fiftieths=fiftieths)
         self._begin()
-        if isinstance(clips, Catalogue):
+        if isinstance(clips, MatchCatalogue):
             chunks, is_kept = iter(clips.chunks), clips.is_resident
         else:
             chunks, is_kept = self._chunks(clips, fiftieths, n_segments=len(segments)), False
@@ -121,6 +121,6 @@ class ChunkedSearch(ABC, Generic[TablesT]):
 
     @abstractmethod
     def _search(
-        self, song: Song, chunk: Chunk[TablesT], floor: NDArray[np.float64], *, is_kept: bool
+        self, song: SongLayout, chunk: Chunk[TablesT], floor: NDArray[np.float64], *, is_kept: bool
     ) -> list[list[Match]]:
         """Search one chunk, silence included; its tables stay with it where they are kept."""

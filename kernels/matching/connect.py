@@ -27,7 +27,7 @@ VELOCITY_SPAN = 2
 
 
 @dataclass(frozen=True)
-class Thresholds:
+class ConnectionThresholds:
     """Differences up to which two poses connect: radians, and radians a second, weighted means over links."""
 
     pose_rad: float
@@ -116,7 +116,7 @@ def own_changes(direction: Float, weight: Float, *, apart_s: float) -> tuple[Flo
     return pose, np.linalg.norm(first.velocity - second.velocity, axis=-1) @ weight
 
 
-def calibrate(changes: Sequence[tuple[Float, Float]]) -> Thresholds:
+def calibrate(changes: Sequence[tuple[Float, Float]]) -> ConnectionThresholds:
     """Set thresholds by what bodies do on their own.
 
     Parameters
@@ -127,14 +127,14 @@ def calibrate(changes: Sequence[tuple[Float, Float]]) -> Thresholds:
 
     Returns
     -------
-    Thresholds
+    ConnectionThresholds
         The 95th percentiles over all clips, each clip given the same say, and at least 0.05 rad and 0.25 rad/s.
     """
     told = [(pose, speed) for pose, speed in changes if len(pose)]
     if not told:
-        return Thresholds(LEAST_POSE_RAD, LEAST_SPEED_RAD_PER_S)
+        return ConnectionThresholds(LEAST_POSE_RAD, LEAST_SPEED_RAD_PER_S)
     share = np.concatenate([np.full(len(pose), 1.0 / len(pose)) for pose, _ in told])
-    return Thresholds(
+    return ConnectionThresholds(
         max(_percentile(np.concatenate([pose for pose, _ in told]), share), LEAST_POSE_RAD),
         max(_percentile(np.concatenate([speed for _, speed in told]), share), LEAST_SPEED_RAD_PER_S),
     )
@@ -146,13 +146,13 @@ def _percentile(values: Float, share: Float) -> float:
     return float(values[order][np.searchsorted(reached, LIKE_NEIGHBOURS_PERCENTILE / 100.0 - 1e-12)])
 
 
-def connects(pose_rad: Float, speed_rad_per_s: Float, limits: Thresholds) -> NDArray[np.bool_]:
+def connects(pose_rad: Float, speed_rad_per_s: Float, limits: ConnectionThresholds) -> NDArray[np.bool_]:
     """Whether both differences are within their thresholds, of the shape given.
 
     Parameters
     ----------
     pose_rad, speed_rad_per_s : float arrays of one shape, >= 0, of :func:`differences`
-    limits : Thresholds
+    limits : ConnectionThresholds
 
     Returns
     -------

@@ -18,7 +18,7 @@ from kernels.matching.score import SCALE_DENOMINATOR
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class StartRun:
     """Neighbouring starts in a clip.
 
     Parameters
@@ -138,7 +138,7 @@ class Layout:
             position = counting(counts.ravel()) * fold + origin
             yield Span(first, stop, scale, position), np.cumsum(columns[part]) - columns[part], here
 
-    def pieces(self, clip: int, *, most: int) -> Iterator[Piece]:
+    def pieces(self, clip: int, *, most: int) -> Iterator[StartRun]:
         """Cut the starts in a clip into pieces.
 
         Parameters
@@ -152,14 +152,14 @@ class Layout:
         for begin in range(0, n_starts, most):
             counts = np.clip(self.counts[clip] - begin, 0, most)
             frames = samples[begin : min(begin + most + reach, n_frames)]
-            yield Piece(clip, begin, first + begin, counts, frames)
+            yield StartRun(clip, begin, first + begin, counts, frames)
 
-    def field(self, piece: Piece, rows: NDArray[np.int64], *, fold: int) -> Field:
+    def field(self, piece: StartRun, rows: NDArray[np.int64], *, fold: int) -> Field:
         """Lay out all starts of a piece in groups.
 
         Parameters
         ----------
-        piece : Piece
+        piece : StartRun
         rows : (M,) int64, segments
         fold : int, starts in a group
         """
@@ -168,12 +168,12 @@ class Layout:
         span = Span(piece.first, piece.first + len(piece.frames), scale, counting(counts) * fold)
         return Field(rows, span, fold, self._fitting(piece, rows, span))
 
-    def unfolded(self, piece: Piece, field: Field) -> Field:
+    def unfolded(self, piece: StartRun, field: Field) -> Field:
         """Lay out the single starts of a field.
 
         Parameters
         ----------
-        piece : Piece
+        piece : StartRun
         field : Field of it
         """
         if field.fold == 1:
@@ -188,12 +188,12 @@ class Layout:
             is_left = of_group if is_left is None else of_group & is_left
         return Field(field.rows, span, 1, is_left)
 
-    def last(self, piece: Piece, rows: NDArray[np.int64], scale: NDArray[np.int64]) -> NDArray[np.int64]:
+    def last(self, piece: StartRun, rows: NDArray[np.int64], scale: NDArray[np.int64]) -> NDArray[np.int64]:
         """Find the last start in a piece.
 
         Parameters
         ----------
-        piece : Piece
+        piece : StartRun
         rows, scale : (N,) int64, segments and scales
 
         Returns
@@ -204,7 +204,7 @@ class Layout:
         found: NDArray[np.int64] = len(piece.frames) - 1 - self.reach[rows, scale]
         return found
 
-    def _fitting(self, piece: Piece, rows: NDArray[np.int64], span: Span) -> NDArray[np.bool_] | None:
+    def _fitting(self, piece: StartRun, rows: NDArray[np.int64], span: Span) -> NDArray[np.bool_] | None:
         """Mark the starts from which a segment ends within the clip; None where all do."""
         if self._is_one_length:
             return None

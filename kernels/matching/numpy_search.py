@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from kernels.matching.blocks import rows
 from kernels.matching.bounds import SumTables
-from kernels.matching.catalogue import Chunk, Series, Song, portions
+from kernels.matching.catalogue import Chunk, Series, SongLayout, portions
 from kernels.matching.chunked import ChunkedSearch
 from kernels.matching.refinement import PAIRS, PLACE_BITS, STAGES, Refinement
 from kernels.matching.score import Match, ratios, sums_of_candidates
@@ -54,7 +54,7 @@ class NumpyMatcher(ChunkedSearch[SumTables]):
             yield Chunk(first, some)
 
     def _search(
-        self, song: Song, chunk: Chunk[SumTables], floor: NDArray[np.float64], *, is_kept: bool
+        self, song: SongLayout, chunk: Chunk[SumTables], floor: NDArray[np.float64], *, is_kept: bool
     ) -> list[list[Match]]:
         """Search one chunk."""
         # products are small: a second thread would mostly wait
@@ -63,7 +63,7 @@ class NumpyMatcher(ChunkedSearch[SumTables]):
         return song.with_silences(found, chunk, floor=floor)
 
     def _search_sounding(
-        self, song: Song, chunk: Chunk[SumTables], floor: NDArray[np.float64], *, is_kept: bool
+        self, song: SongLayout, chunk: Chunk[SumTables], floor: NDArray[np.float64], *, is_kept: bool
     ) -> list[list[Match]]:
         """Find the matches of segments and clips that are not silent."""
         found: list[list[Match]] = [[] for _ in song.segments]
@@ -84,7 +84,7 @@ class NumpyMatcher(ChunkedSearch[SumTables]):
 
     def _search_alike(
         self,
-        song: Song,
+        song: SongLayout,
         chunk: Chunk[SumTables],
         tables: SumTables,
         chosen: NDArray[np.int64],
@@ -136,7 +136,7 @@ def bytes_a_frame(fiftieths: Sequence[int]) -> int:
     return 12 + 2 * sum(len(rows(block, fiftieths)) for block, _ in (PAIRS, *STAGES))
 
 
-def _alike(song: Song, chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+def _alike(song: SongLayout, chosen: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
     """Put together segments of like loudness, density and length, the shorter first."""
     n_frames = song.n_frames[chosen]
     loudness = np.frexp(song.top[chosen])[1] // 4

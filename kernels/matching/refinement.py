@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from kernels.matching.bounds import Bounds, Series, SumTables
 from kernels.matching.candidates import Scores
-from kernels.matching.layout import Field, Layout, Piece
+from kernels.matching.layout import Field, Layout, StartRun
 from kernels.matching.low_rank import RANK
 from kernels.matching.room import Room
 
@@ -117,7 +117,7 @@ class Refinement:
         self._known = np.full(shape, -1.0)
         self._least = floor.copy()
         self._best = Best(np.full(shape, -1.0), np.zeros(shape, np.int64))
-        self._loaded: Piece | None = None
+        self._loaded: StartRun | None = None
 
     def search(self) -> Best:
         """Find the best candidates of all pairs that may be among the k best clips of their segment.
@@ -221,7 +221,7 @@ class Refinement:
             if field.n_cells:
                 self._score(piece, self._layout.unfolded(piece, field))
 
-    def _passing(self, piece: Piece, field: Field, bounds: Bounds) -> Field:
+    def _passing(self, piece: StartRun, field: Field, bounds: Bounds) -> Field:
         """Leave the candidates whose bounds reach what is wanted, and the rows and columns that have any."""
         values = field.bounded(bounds)
         rows = field.rows
@@ -241,7 +241,7 @@ class Refinement:
         bounds_ns = bounds.n_blocks * n_starts * (_SPREAD_NS + _PRODUCT_NS * len(field.rows))
         return bool(bounds_ns < (_SCORE_NS + _TERM_NS * self._scores.n_terms) * field.n_left)
 
-    def _know(self, piece: Piece, field: Field, some: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
+    def _know(self, piece: StartRun, field: Field, some: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
         """Score a candidate, or the neighbours of a group, of each of some rows: a score to beat."""
         if not len(some):
             return
@@ -254,7 +254,7 @@ class Refinement:
         rows = field.rows[some]
         self._known[rows, piece.clip] = np.maximum(self._known[rows, piece.clip], score)
 
-    def _score(self, piece: Piece, field: Field) -> None:
+    def _score(self, piece: StartRun, field: Field) -> None:
         """Score candidates, pair after pair, and keep the best of each."""
         is_left = np.ones((len(field.rows), len(field.span)), bool) if field.is_left is None else field.is_left
         row, column = np.nonzero(is_left)
@@ -280,7 +280,7 @@ class Refinement:
         self._best.place[rows[better], piece.clip] = place[better]
         self._settle(pairs[self._known[pairs, piece.clip] > self._least[pairs]])
 
-    def _load(self, piece: Piece) -> None:
+    def _load(self, piece: StartRun) -> None:
         """Have the scores read from a piece."""
         if self._loaded is not piece:
             self._scores.load(piece.frames)

@@ -8,7 +8,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from kernels.matching.catalogue import Chunk, Series, Song, portions
+from kernels.matching.catalogue import Chunk, Series, SongLayout, portions
 from kernels.matching.chunked import MEMORY_BYTES, ChunkedSearch
 from kernels.matching.plan import PLANS, Plan, bytes_a_frame
 from kernels.matching.score import (
@@ -19,7 +19,7 @@ from kernels.matching.score import (
 )
 from kernels.opencl.choice import pick_device
 from kernels.opencl.match_finalists import candidates, finalists
-from kernels.opencl.match_program import Program
+from kernels.opencl.match_program import MatchProgram
 from kernels.opencl.match_stages import Stages, wants_safe
 from kernels.opencl.match_tables import Tables
 from kernels.opencl.match_tuning import pick_plan
@@ -39,7 +39,7 @@ class Matcher(ChunkedSearch[Tables]):
         The way of searching; None: timed on a sample of the data. No way changes the answer.
     by_level : bool or None
         Refine level by level rather than depth first; None: not on a CPU.
-    program : Program or None
+    program : MatchProgram or None
         Compiled kernels to share; None: the context's own.
 
     Raises
@@ -62,10 +62,10 @@ class Matcher(ChunkedSearch[Tables]):
         memory_bytes: int = MEMORY_BYTES,
         plan: Plan | None = None,
         by_level: bool | None = None,
-        program: Program | None = None,
+        program: MatchProgram | None = None,
     ) -> None:
         super().__init__(memory_bytes=memory_bytes)
-        self.program = program or Program(context or cl.Context([pick_device()]))
+        self.program = program or MatchProgram(context or cl.Context([pick_device()]))
         self.plan = plan
         self.by_level = not self.program.is_cpu if by_level is None else by_level
         self.last_plan: Plan | None = plan
@@ -93,7 +93,7 @@ class Matcher(ChunkedSearch[Tables]):
             yield Chunk(first, some)
 
     def _search(
-        self, song: Song, chunk: Chunk[Tables], floor: NDArray[np.float64], *, is_kept: bool
+        self, song: SongLayout, chunk: Chunk[Tables], floor: NDArray[np.float64], *, is_kept: bool
     ) -> list[list[Match]]:
         """Search one chunk; if the device's memory does not suffice, its halves."""
         try:
@@ -110,7 +110,7 @@ class Matcher(ChunkedSearch[Tables]):
         return song.with_silences(found, chunk, floor=floor)
 
     def _search_device(
-        self, song: Song, chunk: Chunk[Tables], floor: NDArray[np.float64], *, is_kept: bool
+        self, song: SongLayout, chunk: Chunk[Tables], floor: NDArray[np.float64], *, is_kept: bool
     ) -> list[list[Match]]:
         """Find the matches of segments and clips that are not silent."""
         found: list[list[Match]] = [[] for _ in song.segments]
@@ -154,7 +154,7 @@ class Matcher(ChunkedSearch[Tables]):
 
     def _finish(
         self,
-        song: Song,
+        song: SongLayout,
         chunk: Chunk[Tables],
         stages: Stages,
         chosen: NDArray[np.int64],

@@ -16,7 +16,7 @@ _INDEX = ("match_index.cl",)
 _SEARCH = ("match_score.cl", "match_refine.cl")
 
 
-class Program:
+class MatchProgram:
     """Kernels for one device; vector width, segments taken together and work-group sizes follow the device.
 
     Parameters

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kernels.matching.blocks import Rows, parent, rows
 from kernels.matching.plan import Plan, built
-from kernels.opencl.match_program import Program
+from kernels.opencl.match_program import MatchProgram
 
 _BATCH_BYTES = 2**24
 
@@ -20,7 +20,7 @@ class Tables:
 
     Parameters
     ----------
-    program : Program
+    program : MatchProgram
     clips : sequence of (T,) float, each with T >= 1, finite, >= 0, and at least one value > 0
     numerators : the scales times 50
 
@@ -34,7 +34,9 @@ class Tables:
     Values are divided by a power of two, so that the largest lies between 1/2 and 1 whatever the features' unit.
     """
 
-    def __init__(self, program: Program, clips: Sequence[NDArray[np.floating]], *, numerators: tuple[int, ...]) -> None:
+    def __init__(
+        self, program: MatchProgram, clips: Sequence[NDArray[np.floating]], *, numerators: tuple[int, ...]
+    ) -> None:
         self.program = program
         self.numerators = numerators
         self.exponent = int(np.frexp(max(float(clip.max()) for clip in clips))[1])

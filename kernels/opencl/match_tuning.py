@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kernels.matching.plan import BRUTE, PLANS, Plan, bytes_a_frame
 from kernels.opencl.match_finalists import finalists
-from kernels.opencl.match_program import Program
+from kernels.opencl.match_program import MatchProgram
 from kernels.opencl.match_stages import Stages, wants_safe
 from kernels.opencl.match_tables import Tables
 
@@ -42,7 +42,7 @@ def worth_trying(segments: NDArray[np.float64], n_frames: NDArray[np.int64]) -> 
 
 
 def pick_plan(
-    program: Program,
+    program: MatchProgram,
     segments: NDArray[np.float64],
     *,
     n_frames: NDArray[np.int64],
@@ -55,7 +55,7 @@ def pick_plan(
 
     Parameters
     ----------
-    program : Program
+    program : MatchProgram
     segments : (S, L) float64, S >= 1
         Filled up with zeros.
     n_frames : (S,) int64

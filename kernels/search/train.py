@@ -53,7 +53,7 @@ class Training:
     has_travel: bool = True
 
 
-class Encoder(eqx.Module):
+class EncoderNetwork(eqx.Module):
     """The network as Equinox and Optax see it."""
 
     weights: dict[str, jax.Array]
@@ -116,14 +116,14 @@ def train(
     if len(position_xyz_m) < 2:
         raise ValueError(f"training: want two motions or more, got {len(position_xyz_m)}; add clips")
     rng = np.random.default_rng(how.seed)
-    encoder = Encoder({name: jnp.asarray(value) for name, value in network.initial_weights(rng).items()})
+    encoder = EncoderNetwork({name: jnp.asarray(value) for name, value in network.initial_weights(rng).items()})
     warm_up = min(20, how.steps // 2)
     rate = optax.warmup_cosine_decay_schedule(0.0, how.learning_rate, warm_up, max(how.steps, warm_up + 1))
     optimiser = optax.adamw(rate, weight_decay=how.weight_decay)
     state = optimiser.init(eqx.filter(encoder, eqx.is_inexact_array))
 
     @eqx.filter_jit
-    def step(encoder: Encoder, state: Any, channel: Any, mask: Any, label: Any) -> tuple[Encoder, Any]:  # noqa: ANN401 - pytrees
+    def step(encoder: EncoderNetwork, state: Any, channel: Any, mask: Any, label: Any) -> tuple[EncoderNetwork, Any]:  # noqa: ANN401 - pytrees
         gradient = eqx.filter_grad(lambda e: contrast(e(channel, mask), label))(encoder)
         update, state = optimiser.update(gradient, state, eqx.filter(encoder, eqx.is_inexact_array))
         return eqx.apply_updates(encoder, update), state
@@ -138,7 +138,7 @@ def train(
     return weights_of(encoder)
 
 
-def weights_of(encoder: Encoder) -> Trained:
+def weights_of(encoder: EncoderNetwork) -> Trained:
     """Weights as NumPy arrays."""
     return {name: np.asarray(value, np.float32) for name, value in encoder.weights.items()}
 

@@ -35,7 +35,7 @@ _HINGE: dict[tuple[str, ...], tuple[str, str, str]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class PlacedRig:
     """A clip on its rig, placed in the world, with what is known of its body.
 
     Parameters
@@ -170,12 +170,12 @@ def check_body(at: Mapping[str, int], position: Float) -> None:
             raise ValueError(f"joints: want {a} and {b} apart, got them in one place; check the joint mapping")
 
 
-def neutral_orientations(rig: Rig) -> dict[int, Float]:
+def neutral_orientations(rig: PlacedRig) -> dict[int, Float]:
     """Find the neutral orientation of each joint that drives the body.
 
     Parameters
     ----------
-    rig : Rig
+    rig : PlacedRig
         Of at least one frame, passed by :func:`check_body`.
 
     Returns
@@ -194,7 +194,7 @@ def neutral_orientations(rig: Rig) -> dict[int, Float]:
     return _from_motion(rig) if body is None else _from_rest(rig, body)
 
 
-def _is_nothing(rig: Rig, a: int, b: int) -> bool:
+def _is_nothing(rig: PlacedRig, a: int, b: int) -> bool:
     """Whether two joints are in one place at some frame: no direction leads from one to the other."""
     way = rig.position[:, b] - rig.position[:, a]
     return bool((np.sum(way * way, axis=-1) < 1e-12).any())
@@ -222,7 +222,7 @@ def _snap(vector: Float, limit: float = 0.9) -> Float:
     return np.sign(vector[k]) * np.eye(3)[k] if abs(vector[k]) > limit else vector
 
 
-def _body_turn(rig: Rig) -> Float | None:
+def _body_turn(rig: PlacedRig) -> Float | None:
     """Turn (4,) that stands the rest pose upright facing +Z; None where the rest pose is no human pose."""
     at, rest = rig.at, rig.rest
     left = _snap(rest[at["leftUpperLeg"]] - rest[at["rightUpperLeg"]])
@@ -245,7 +245,7 @@ def _body_turn(rig: Rig) -> Float | None:
     return body if is_human else None
 
 
-def _from_rest(rig: Rig, body: Float) -> dict[int, Float]:
+def _from_rest(rig: PlacedRig, body: Float) -> dict[int, Float]:
     """Neutral orientations from a human rest pose: all orientations there are the identity, so the swing is neutral."""
     at, rest = rig.at, rig.rest
     neutral: dict[int, Float] = {at["hips"]: body}
@@ -287,7 +287,7 @@ def _swing(direction: Float, target: Float, turned: Float) -> Float:
     return rotation.mul(rotation.between(direction, target), turned)
 
 
-def _flat_foot(rig: Rig, shin: Float, body: Float, bone: Float) -> Float:
+def _flat_foot(rig: PlacedRig, shin: Float, body: Float, bone: Float) -> Float:
     """Neutral orientation of a foot from its rest pose: pointing ahead, at the elevation that lies flat.
 
     The elevation at rest is that of another foot's anatomy, to be kept, or of a rest pose with stretched feet, to be
@@ -307,7 +307,7 @@ def _flat_foot(rig: Rig, shin: Float, body: Float, bone: Float) -> Float:
     return _swing(direction, foot_direction(pitch), turned)
 
 
-def _from_motion(rig: Rig) -> dict[int, Float]:
+def _from_motion(rig: PlacedRig) -> dict[int, Float]:
     """Neutral orientations where the rest pose is no human pose."""
     at, P, G = rig.at, rig.position, rig.orientation
     neutral: dict[int, Float] = {}
@@ -376,14 +376,14 @@ def _from_motion(rig: Rig) -> dict[int, Float]:
     return neutral
 
 
-def _bend(rig: Rig, side: str, limb: tuple[str, ...]) -> Float | None:
+def _bend(rig: PlacedRig, side: str, limb: tuple[str, ...]) -> Float | None:
     """Axes (F, 3) about which elbow or knee bends, as long as the sine of the bend; None where it hardly does."""
     a, b, c = (rig.position[:, rig.at[side + part]] for part in _HINGE[limb])
     axis = _cross(unit(b - a), unit(c - b))
     return axis if np.sqrt(np.mean(np.sum(axis**2, axis=-1))) > np.sin(np.radians(5.0)) else None
 
 
-def _is_square(rig: Rig) -> bool:
+def _is_square(rig: PlacedRig) -> bool:
     """Whether elbows and knees bend about coordinate axes of the joints above them."""
     for side in SIDES:
         for limb in (topology.ARM, topology.LEG):

@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels import rotation
 from kernels.skeleton import alignment, kinematics, topology
-from kernels.skeleton.alignment import SIDES, Rig
+from kernels.skeleton.alignment import SIDES, PlacedRig
 from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
 from kernels.skeleton.contacts import find_contacts
 from kernels.skeleton.naming import JointMapping
@@ -97,7 +97,7 @@ def measure(clip: Clip, mapping: JointMapping, *, floor_m: float | None = None) 
     alignment.check_body(at, position)
     spine, neck = topology.trunk(clip.skeleton, mapping.joint)
     rest = alignment.rest_position(clip)
-    rig = Rig(clip, at, spine, neck, rest, position, orientation, _planted_pitch_rad(at, position, clip))
+    rig = PlacedRig(clip, at, spine, neck, rest, position, orientation, _planted_pitch_rad(at, position, clip))
     neutral = alignment.neutral_orientations(rig)
     local_m = rest - np.concatenate([np.zeros((1, 3)), rest[clip.skeleton.parent[1:]]])
     skeleton = Skeleton(clip.skeleton.joints, clip.skeleton.parent, local_m)

@@ -19,7 +19,7 @@ Bool = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Thresholds:
+class ContactThresholds:
     """What counts as standing.
 
     A stretch of frames in which a point keeps below the loose limits is a contact if it gets below the tight ones.
@@ -77,7 +77,7 @@ def find_contacts(
     *,
     frame_rate_hz: float,
     planted_height_m: tuple[float, float] | None = None,
-    thresholds: Thresholds | None = None,
+    thresholds: ContactThresholds | None = None,
 ) -> FootContacts:
     """Find when ankles and toes stand still at their planted heights.
 
@@ -88,7 +88,7 @@ def find_contacts(
     frame_rate_hz : float, > 0
     planted_height_m : heights of a planted ankle and of planted toes where they are known
         Else estimated, see :func:`planted_heights`.
-    thresholds : Thresholds, or None for the defaults
+    thresholds : ContactThresholds, or None for the defaults
 
     Returns
     -------
@@ -101,7 +101,7 @@ def find_contacts(
         If shapes are not (F, 2, 3), a value is not finite, or the rate is not > 0.
     """
     _check_feet(ankle_xyz_m, toes_xyz_m, frame_rate_hz)
-    limits = thresholds or Thresholds()
+    limits = thresholds or ContactThresholds()
     if len(ankle_xyz_m) == 0:
         none = np.zeros((0, 2), bool)
         return FootContacts(none, none.copy(), 0.0, 0.0, 0.0)
@@ -159,7 +159,7 @@ def planted_heights(ankle_xyz_m: Float, toes_xyz_m: Float, *, frame_rate_hz: flo
         if len(point) == 0:
             heights.append(0.0)
             continue
-        height, speed = _height_and_speed(np.asarray(point, np.float64), frame_rate_hz, Thresholds().window_s)
+        height, speed = _height_and_speed(np.asarray(point, np.float64), frame_rate_hz, ContactThresholds().window_s)
         lowest = np.argmin(height, axis=1)[:, None]
         low = np.take_along_axis(height, lowest, axis=1)[:, 0]
         slow = low[np.take_along_axis(speed, lowest, axis=1)[:, 0] < 0.3]
@@ -225,7 +225,7 @@ def _height_and_speed(point: Float, frame_rate_hz: float, window_s: float) -> tu
     return height, np.minimum(np.concatenate([speed, none]), np.concatenate([none, speed]))
 
 
-def _standing(point: Float, planted_height_m: float, frame_rate_hz: float, limits: Thresholds) -> Bool:
+def _standing(point: Float, planted_height_m: float, frame_rate_hz: float, limits: ContactThresholds) -> Bool:
     height, speed = _height_and_speed(np.asarray(point, np.float64), frame_rate_hz, limits.window_s)
     height = np.abs(height - planted_height_m)
     tight = (height < limits.tight_height_m) & (speed < limits.tight_speed_m_per_s)
@@ -250,7 +250,7 @@ def _reach(tight: Bool, loose: Bool) -> Bool:
     return out
 
 
-def _mend(mask: Bool, frame_rate_hz: float, limits: Thresholds) -> Bool:
+def _mend(mask: Bool, frame_rate_hz: float, limits: ContactThresholds) -> Bool:
     """Close short gaps, then drop short runs; a clip shorter than the shortest run is left alone."""
     out = mask.copy()
     start, stop = runs(~out)

@@ -35,7 +35,7 @@ LEG_M = _THIGH_M + _SHIN_M
 
 
 @dataclass(frozen=True)
-class Give:
+class GroundingGive:
     """How far the body gives way to keep its feet planted.
 
     Parameters
@@ -66,7 +66,7 @@ def plant_root(
     source_toes_xyz_m: Float,
     contacts: FootContacts,
     frame_rate_hz: float,
-    give: Give | None = None,
+    give: GroundingGive | None = None,
 ) -> Float:
     """Find how the root must move so that feet planted in the source do not slide and stand at their height.
 
@@ -77,7 +77,7 @@ def plant_root(
     source_ankle_xyz_m, source_toes_xyz_m : (F, 2, 3) float, metres, at the canonical body's scale
     contacts : FootContacts of the source
     frame_rate_hz : float, > 0
-    give : Give, or None for the defaults
+    give : GroundingGive, or None for the defaults
 
     Returns
     -------
@@ -85,7 +85,7 @@ def plant_root(
         Sideways it has no drift to speak of: without contacts it is zero. Up, it lifts planted toes and ankles to the
         height they have in the canonical rest pose.
     """
-    give = give or Give()
+    give = give or GroundingGive()
     point, source = _points(position_xyz_m), np.stack([source_ankle_xyz_m, source_toes_xyz_m])
     mask = np.stack([contacts.ankle, contacts.toes])
     mask[0] &= ~mask[1]
@@ -117,7 +117,7 @@ def plant_legs(
     source_toes_xyz_m: Float,
     contacts: FootContacts,
     frame_rate_hz: float,
-    give: Give | None = None,
+    give: GroundingGive | None = None,
 ) -> Float:
     """Turn thighs and shins a little where planted feet still slide.
 
@@ -128,14 +128,14 @@ def plant_legs(
     source_ankle_xyz_m, source_toes_xyz_m : (F, 2, 3) float, metres, at the canonical body's scale
     contacts : FootContacts of the source
     frame_rate_hz : float, > 0
-    give : Give, or None for the defaults
+    give : GroundingGive, or None for the defaults
 
     Returns
     -------
     (F, 22, 4) float64, world orientations
         Feet keep their orientation in the world. No thigh or shin turns by more than ``give.leg_limit_rad``.
     """
-    give = give or Give()
+    give = give or GroundingGive()
     point, source = _points(position_xyz_m), np.stack([source_ankle_xyz_m, source_toes_xyz_m])
     height = np.array([ANKLE_HEIGHT_M, TOES_HEIGHT_M]) - [contacts.ankle_height_m, contacts.toes_height_m]
     mask = np.stack([contacts.ankle, contacts.toes])
@@ -156,7 +156,9 @@ def plant_legs(
     return bend_legs(position_xyz_m, orientation_wxyz, shift, limit_rad=give.leg_limit_rad)
 
 
-def cancel_steps(weight: Float, step: Float, frame_rate_hz: float, *, give: Give, pull: Float | float) -> Float:
+def cancel_steps(
+    weight: Float, step: Float, frame_rate_hz: float, *, give: GroundingGive, pull: Float | float
+) -> Float:
     """Find a displacement whose steps come near to wanted ones where they count, and which is slow and smooth besides.
 
     Parameters
@@ -164,7 +166,7 @@ def cancel_steps(weight: Float, step: Float, frame_rate_hz: float, *, give: Give
     weight : (F - 1,) float, >= 0, of each step
     step : (F - 1,) float, metres, the wanted steps times their weights
     frame_rate_hz : float, > 0
-    give : Give, for the weight of added speed and the time of its changes
+    give : GroundingGive, for the weight of added speed and the time of its changes
     pull : float or (F,) float, per square second, > 0, weight of the displacement itself
 
     Returns
@@ -174,7 +176,7 @@ def cancel_steps(weight: Float, step: Float, frame_rate_hz: float, *, give: Give
     return _solve(len(weight) + 1, frame_rate_hz, give, step_weight=weight, step=step, pull=pull)
 
 
-def keep_places(weight: Float, place: Float, frame_rate_hz: float, *, give: Give) -> Float:
+def keep_places(weight: Float, place: Float, frame_rate_hz: float, *, give: GroundingGive) -> Float:
     """Find a displacement that comes near to wanted places where they count, and which is slow and smooth besides.
 
     Parameters
@@ -182,7 +184,7 @@ def keep_places(weight: Float, place: Float, frame_rate_hz: float, *, give: Give
     weight : (F,) float, per square second, > 0, of each place
     place : (F,) float, metres
     frame_rate_hz : float, > 0
-    give : Give, for the weight of added speed and the time of its changes
+    give : GroundingGive, for the weight of added speed and the time of its changes
 
     Returns
     -------
@@ -260,7 +262,7 @@ def _is_lower(toes_xyz_m: Float) -> NDArray[np.bool_]:
 def _solve(
     n: int,
     frame_rate_hz: float,
-    give: Give,
+    give: GroundingGive,
     *,
     step_weight: Float | None = None,
     step: Float | None = None,

@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels import rotation
 from kernels.skeleton import alignment, grounding, kinematics, topology
-from kernels.skeleton.alignment import SIDES, Rig, X, Y, bone_direction, unit
+from kernels.skeleton.alignment import SIDES, PlacedRig, X, Y, bone_direction, unit
 from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
 from kernels.skeleton.contacts import FootContacts, find_contacts
 from kernels.skeleton.naming import JointMapping
@@ -49,7 +49,7 @@ class CanonicalMotion:
     contacts: FootContacts
 
 
-def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.Give | None = None) -> CanonicalMotion:
+def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.GroundingGive | None = None) -> CanonicalMotion:
     """Bring a clip to the canonical skeleton.
 
     Parameters
@@ -58,7 +58,7 @@ def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.Give | None =
         In metres, Y up, on its own rig.
     mapping : JointMapping
         From :func:`kernels.skeleton.naming.map_joints`.
-    give : grounding.Give, or None for the defaults
+    give : grounding.GroundingGive, or None for the defaults
         How far root and legs give way to keep planted feet planted.
 
     Returns
@@ -124,7 +124,7 @@ def retarget(clip: Clip, mapping: JointMapping, *, give: grounding.Give | None =
     )
 
 
-def _place(clip: Clip, mapping: JointMapping) -> Rig:
+def _place(clip: Clip, mapping: JointMapping) -> PlacedRig:
     """Place the joints that matter: the mapped ones and all above them."""
     skeleton = clip.skeleton
     missing = [source for source in mapping.joint.values() if source not in skeleton.joints]
@@ -135,7 +135,7 @@ def _place(clip: Clip, mapping: JointMapping) -> Rig:
         skeleton, clip.root_xyz_m, clip.rotation_wxyz, at.values(), translation_xyz_m=clip.translation_xyz_m
     )
     spine, neck = topology.trunk(skeleton, mapping.joint)
-    return Rig(
+    return PlacedRig(
         clip=clip,
         at=at,
         spine=spine,
@@ -146,7 +146,7 @@ def _place(clip: Clip, mapping: JointMapping) -> Rig:
     )
 
 
-def _leg_length_m(rig: Rig) -> float:
+def _leg_length_m(rig: PlacedRig) -> float:
     """Thigh and shin, mean of both sides, by their usual length in the motion."""
     length = 0.0
     for side in SIDES:
@@ -164,7 +164,7 @@ def _planted_pitch_rad(ankle: Float, toes: Float, contacts: FootContacts) -> flo
     return float(np.median(np.arcsin(direction[:, 1].clip(-1, 1))))
 
 
-def _orientations(rig: Rig) -> Float:
+def _orientations(rig: PlacedRig) -> Float:
     """World orientations (F, 22, 4) of the canonical joints."""
     neutral = alignment.neutral_orientations(rig)
     P = rig.position
@@ -197,7 +197,7 @@ def _straighten(q: Float, axis: Float, direction: Float) -> Float:
     return rotation.mul(rotation.between(here, np.where(is_bone, direction, here)), q)
 
 
-def _bend_spine(rig: Rig, out: Float, turned: dict[int, Float]) -> None:
+def _bend_spine(rig: PlacedRig, out: Float, turned: dict[int, Float]) -> None:
     """Fill in spine, chest, upperChest and neck: turns and directions of the source's spine, taken as a curve."""
     joints = [rig.at["hips"], *rig.spine, rig.neck[0]]
     step = np.linalg.norm(np.diff(rig.rest[joints], axis=0), axis=-1)

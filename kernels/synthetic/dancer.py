@@ -55,7 +55,7 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class SyntheticTake:
     """A made-up take: the clip, its label, and when its beats are, seconds."""
 
     label: str
@@ -275,7 +275,7 @@ def take(
     frame_rate_hz: float = 30.0,
     size: float = 1.0,
     turned_rad: float = 0.0,
-) -> Take:
+) -> SyntheticTake:
     """Make one take of a move.
 
     Parameters
@@ -292,7 +292,7 @@ def take(
 
     Returns
     -------
-    Take
+    SyntheticTake
         Ends ``first_beat_s`` after its last beat. The beats of ``idle`` are empty.
 
     Raises
@@ -311,15 +311,15 @@ def take(
     turned[:, 0] = rotation.mul(q, turned[:, 0])
     clip = Clip(CANONICAL, frame_rate_hz, rotation.apply(q, clip.root_xyz_m), rotation.continuous(turned))
     beat_s: Float = first_beat_s + interval_s * np.arange(n_beats, dtype=np.float64)
-    return Take(label, clip, beat_s if label != "idle" else np.zeros(0))
+    return SyntheticTake(label, clip, beat_s if label != "idle" else np.zeros(0))
 
 
-def place(made: Take) -> Float:
+def place(made: SyntheticTake) -> Float:
     """Place a take's joints in the world.
 
     Parameters
     ----------
-    made : Take of F frames
+    made : SyntheticTake of F frames
 
     Returns
     -------

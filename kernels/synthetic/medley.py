@@ -16,8 +16,8 @@ from kernels.assembly.joins import ease
 from kernels.calibration.records import PARENT, SENSORS
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
-from kernels.synthetic.dancer import MOVES, Figure, Take, pose
-from kernels.synthetic.suit import Body, Motion
+from kernels.synthetic.dancer import MOVES, Figure, SyntheticTake, pose
+from kernels.synthetic.suit import BoneMotion, SyntheticBody
 from kernels.types import Clip, Float
 
 _T_POSE_S, _RAMP_S = 1.5, 1.0
@@ -57,7 +57,7 @@ def medley(
     frame_rate_hz: float = 60.0,
     size: float = 1.0,
     seed: int = 0,
-) -> Take:
+) -> SyntheticTake:
     """Dance several moves on end, after standing in a T-pose.
 
     Parameters
@@ -73,7 +73,7 @@ def medley(
 
     Returns
     -------
-    Take
+    SyntheticTake
         Labelled ``medley``; the beats of ``idle`` are left out.
 
     Raises
@@ -99,7 +99,7 @@ def medley(
     beats = [
         lead_s + interval_s * (k * n_beats + np.arange(n_beats)) for k, name in enumerate(labels) if name != "idle"
     ]
-    return Take("medley", swayed, np.concatenate([*beats, np.zeros(0)]))
+    return SyntheticTake("medley", swayed, np.concatenate([*beats, np.zeros(0)]))
 
 
 def sway(clip: Clip, *, seed: int, share: Float | float = 1.0) -> Clip:
@@ -135,17 +135,17 @@ def sway(clip: Clip, *, seed: int, share: Float | float = 1.0) -> Clip:
     return replace(clip, rotation_wxyz=rotation.continuous(local))
 
 
-def wear(clip: Clip, body: Body) -> Motion:
+def wear(clip: Clip, body: SyntheticBody) -> BoneMotion:
     """Let a made-up body in a suit move as a clip does.
 
     Parameters
     ----------
     clip : Clip on the canonical skeleton, F frames
-    body : Body
+    body : SyntheticBody
 
     Returns
     -------
-    Motion
+    BoneMotion
         In the suit's world, z up; root travel is scaled by leg length.
     """
     _, world = kinematics.place(clip)
@@ -157,7 +157,7 @@ def wear(clip: Clip, body: Body) -> Motion:
             local[:, k] = rotation.mul(rotation.inv(turned[:, above]), turned[:, k])
     leg_m = sum(float(np.linalg.norm(body.offset_m[SENSORS.index(name)])) for name in ("l_shank", "l_foot"))
     root = rotation.apply(_TO_SUIT, clip.root_xyz_m) * (leg_m / LEG_LENGTH_M)
-    return Motion(clip.frame_rate_hz, root, rotation.continuous(local))
+    return BoneMotion(clip.frame_rate_hz, root, rotation.continuous(local))
 
 
 def _loosened(figure: Figure, time_s: Float, share: Float, seed: int) -> Figure:

@@ -42,7 +42,7 @@ class ClickTrain:
 
 
 @dataclass(frozen=True, eq=False)
-class Song:
+class SyntheticSong:
     """A song as notes and as sound.
 
     Parameters
@@ -186,7 +186,7 @@ def drum_machine_song(
     beats_per_bar: int = 4,
     start_s: float = 0.0,
     seed: int = 0,
-) -> Song:
+) -> SyntheticSong:
     """Program a drum machine, a bass and chords.
 
     Parameters
@@ -203,7 +203,7 @@ def drum_machine_song(
 
     Returns
     -------
-    :class:`Song`
+    :class:`SyntheticSong`
         Notes start exactly on the grid of sixteenths between the beats.
 
     Raises
@@ -252,7 +252,7 @@ def drum_machine_song(
         beat_in_bar_number=number % beats_per_bar + 1,
         confidence=np.ones(n_beats),
     )
-    return Song(sorted_notes(rows), beats, _tempo_map(edge_s, beats_per_bar), beats_per_bar)
+    return SyntheticSong(sorted_notes(rows), beats, _tempo_map(edge_s, beats_per_bar), beats_per_bar)
 
 
 def _tempo_map(edge_s: Float, beats_per_bar: int) -> tuple[tuple[float, float], ...]:

@@ -112,7 +112,7 @@ def draw_notes(rules: Rules, state: Int, *, interval_s: float, start_s: float = 
 
 
 @dataclass(frozen=True, eq=False)
-class Performance:
+class SyntheticPerformance:
     """A clip, the song it was danced to, and what was hidden.
 
     Parameters
@@ -144,7 +144,7 @@ def perform(
     frame_rate_hz: float = 30.0,
     seed: int = 0,
     unsteady_s: float = 0.01,
-) -> Performance:
+) -> SyntheticPerformance:
     """Let the dancer dance by rules to the drums they call.
 
     Parameters
@@ -159,7 +159,7 @@ def perform(
 
     Returns
     -------
-    Performance
+    SyntheticPerformance
     """
     state = draw_states(rules, n_motions, seed=seed)
     notes = draw_notes(rules, state, interval_s=interval_s, seed=seed)
@@ -167,7 +167,7 @@ def perform(
     clip = dance(state, edge_s=edge_s, frame_rate_hz=frame_rate_hz, seed=seed, unsteady_s=unsteady_s)
     number = np.arange(n_motions)
     beats = BeatGrid(edge_s[:-1], number // 4 + 1, number % 4 + 1, np.ones(n_motions))
-    return Performance(clip, notes, beats, state, edge_s)
+    return SyntheticPerformance(clip, notes, beats, state, edge_s)
 
 
 def dance(state: Int, *, edge_s: Float, frame_rate_hz: float, seed: int, unsteady_s: float = 0.0) -> Clip:

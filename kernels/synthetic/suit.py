@@ -65,7 +65,7 @@ _WOBBLE: dict[str, float] = {"thigh": 1.5, "upper_arm": 1.2, "head": 0.2}
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class SyntheticBody:
     """Bones and mounts of a made-up performer.
 
     Parameters
@@ -95,7 +95,7 @@ class Body:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class BoneMotion:
     """How bones move: world position (F, 3) of the pelvis, local rotations (F, 17, 4), the pelvis's in the world."""
 
     frame_rate_hz: float
@@ -110,7 +110,7 @@ class MadeUp:
     Parameters
     ----------
     recording : Recording
-    body : Body
+    body : SyntheticBody
     joint_xyz_m : (F, 17, 3) float64, metres, world
         Proximal joints; the pelvis's own origin first.
     sensor_wxyz : (F, 17, 4) float64, world
@@ -121,7 +121,7 @@ class MadeUp:
     """
 
     recording: Recording
-    body: Body
+    body: SyntheticBody
     joint_xyz_m: Float
     sensor_wxyz: Float
     sensor_xyz_m: Float
@@ -160,7 +160,7 @@ def part(sensor: str) -> str:
     return sensor[2:] if sensor[:2] in ("l_", "r_") else sensor
 
 
-def make_body(seed: int) -> Body:
+def make_body(seed: int) -> SyntheticBody:
     """Draw an adult body of about 1.75 m with sensors strapped on anyhow.
 
     Parameters
@@ -169,7 +169,7 @@ def make_body(seed: int) -> Body:
 
     Returns
     -------
-    Body
+    SyntheticBody
     """
     rng = _stream(seed, "body")
     size = rng.normal(1, 0.06)
@@ -180,7 +180,7 @@ def make_body(seed: int) -> Body:
         scale = size * factor[part(name)] * rng.normal(1, 0.008)
         offset[k] = scale * mirrored * _OFFSET_MM[part(name)] + rng.normal(0, 4, 3) * (k > 0)
         mount[k] = size * mirrored * _MOUNT_MM[part(name)] + rng.normal(0, 8, 3)
-    return Body(offset / 1000, mount / 1000, rotation.normalize(rng.normal(size=(17, 4))))
+    return SyntheticBody(offset / 1000, mount / 1000, rotation.normalize(rng.normal(size=(17, 4))))
 
 
 def range_of_motion(
@@ -191,7 +191,7 @@ def range_of_motion(
     size: float = 1.0,
     frozen: tuple[str, ...] = (),
     hinged: tuple[str, ...] = (),
-) -> Motion:
+) -> BoneMotion:
     """Move every joint about all its axes, walking about, after two seconds in a T-pose.
 
     Parameters
@@ -206,7 +206,7 @@ def range_of_motion(
 
     Returns
     -------
-    Motion
+    BoneMotion
     """
     rng = _stream(seed, "motion")
     time_s = np.arange(n_frames) / frame_rate_hz
@@ -233,16 +233,16 @@ def range_of_motion(
             angle = angle * (0.0 if name in frozen else size)
         local[:, k] = rotation.exp(ease * angle)
     root = sways(rng, time_s, np.degrees([0.5, 0.5, 0.03]), pace_hz=0.12)
-    return Motion(frame_rate_hz, ease * root + np.array([0.9, 0.1, 0.95]), local)
+    return BoneMotion(frame_rate_hz, ease * root + np.array([0.9, 0.1, 0.95]), local)
 
 
-def record(body: Body, motion: Motion, *, seed: int, disturbance: Disturbance | None = None) -> MadeUp:
+def record(body: SyntheticBody, motion: BoneMotion, *, seed: int, disturbance: Disturbance | None = None) -> MadeUp:
     """Strap the sensors on, move, and read them.
 
     Parameters
     ----------
-    body : Body
-    motion : Motion of F frames
+    body : SyntheticBody
+    motion : BoneMotion of F frames
     seed : int, >= 0
         Of noise, outliers and drop-outs, each in a stream of its own.
     disturbance : Disturbance, or None for 2 mm, 1 degree, 1 % outliers and 1 % drop-outs
@@ -385,7 +385,7 @@ def _bursts(rng: np.random.Generator, shape: tuple[int, int], ratio: float, *, m
     return is_marked
 
 
-def _soft_tissue(seed: int, motion: Motion, bone_xyz_m: Float, wobble_m: float) -> tuple[Float, Float]:
+def _soft_tissue(seed: int, motion: BoneMotion, bone_xyz_m: Float, wobble_m: float) -> tuple[Float, Float]:
     """Slide (F, 17, 3) metres and turn (F, 17, 3) radians of each sensor on its bone."""
     rng = _stream(seed, "soft tissue")
     f, rate = len(bone_xyz_m), motion.frame_rate_hz

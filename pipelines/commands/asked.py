@@ -7,7 +7,7 @@ from typing import Any
 
 from assets.dancing.methods import USUAL
 from assets.formats.errors import FormatError
-from assets.sources.sources import Song
+from assets.sources.sources import SongFile
 from pipelines.commands.search import by_likeness
 from pipelines.freshness import Freshness
 from pipelines.studio.files import StudioError
@@ -24,7 +24,7 @@ def pin_texts(pins: Sequence[str], root: Path, progress: Callable[[], Any]) -> t
         raise StudioError(f"--pin: {error}") from error
 
 
-def briefed_method(studio: StudioFolder, song: Song) -> str:
+def briefed_method(studio: StudioFolder, song: SongFile) -> str:
     """Find the method a song's brief names; the usual one where the brief cannot be read (its song is refused)."""
     try:
         return studio.brief(song).method
@@ -32,7 +32,7 @@ def briefed_method(studio: StudioFolder, song: Song) -> str:
         return USUAL
 
 
-def wanted_songs(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[Song]:
+def wanted_songs(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[SongFile]:
     """Find songs by key, file name, stem or path; LookupError naming the nearest where there is none."""
     songs = {key: state.sources.song(key) for key in state.sources.songs_by_key()}
     if not songs:
@@ -62,5 +62,5 @@ def wanted_songs(state: Freshness, wanted: Sequence[str], studio: StudioFolder) 
     return list(dict.fromkeys(found))
 
 
-def _same(studio: StudioFolder, song: Song, text: str) -> bool:
+def _same(studio: StudioFolder, song: SongFile, text: str) -> bool:
     return Path(text).absolute() == studio.file(song.path)

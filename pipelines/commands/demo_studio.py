@@ -10,10 +10,10 @@ from assets.formats import audio, bvh, midi, suit
 from assets.formats.audio import Audio
 from kernels.calibration.records import Recording
 from kernels.synthetic import rigs
-from kernels.synthetic.dancer import MOVES, Take, take
+from kernels.synthetic.dancer import MOVES, SyntheticTake, take
 from kernels.synthetic.medley import medley, wear
 from kernels.synthetic.music import drum_machine_song
-from kernels.synthetic.performance import Performance, hidden_rules, perform
+from kernels.synthetic.performance import SyntheticPerformance, hidden_rules, perform
 from kernels.synthetic.suit import Disturbance, make_body, record
 from pipelines.studio.files import StudioError, write_beside
 
@@ -91,7 +91,7 @@ def _files() -> Iterator[tuple[str, bytes]]:
     yield f"songs/{SONG}.mid", midi.format(song.notes, tempo=song.tempo)
 
 
-def performance() -> Performance:
+def performance() -> SyntheticPerformance:
     """Dance 200 motions to the drums they call, one a beat."""
     return perform(hidden_rules(seed=_RULES_SEED), n_motions=N_MOTIONS, interval_s=60 / TEMPO_BPM, seed=_RULES_SEED)
 
@@ -104,7 +104,7 @@ def suit_recording() -> Recording:
     return record(body, motion, seed=_SUIT_SEED, disturbance=noise).recording
 
 
-def _takes(rate_hz: float) -> Iterator[tuple[str, Take]]:
+def _takes(rate_hz: float) -> Iterator[tuple[str, SyntheticTake]]:
     for label in MOVES:
         for number, (interval_s, turned, size) in enumerate(_TAKES, start=1):
             yield (

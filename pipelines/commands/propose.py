@@ -10,7 +10,7 @@ from assets.dancing.by_graph import catalogue, poses_of
 from assets.dancing.methods import USUAL
 from assets.dancing.refusal import RefusalError
 from assets.reading.clips import read_clips
-from assets.reading.songs import heard_song
+from assets.reading.songs import played_song
 from assets.tables.graph import to_motion_graph
 from assets.tables.music import to_music_beat
 from pipelines import build as building
@@ -45,7 +45,7 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
         raise StudioError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
     duration_s = float(max(lake.table("song", song)["duration_s"].to_pylist()))
     feature, repeat = (lake.table(name, song) for name in ("music_feature", "music_repeat"))
-    played = heard_song(beats, duration_s, feature=feature, repeat=repeat)
+    played = played_song(beats, duration_s, feature=feature, repeat=repeat)
     try:
         at = proposals.place_of(place, played)
     except ValueError as error:

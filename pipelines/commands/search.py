@@ -21,7 +21,7 @@ from kernels.search.aligned import MOST_FRAMES, QUERY_HZ, Alignment, align, room
 from kernels.search.nearest import Copies, Hit, nearest_clips, steer
 from kernels.types import Int
 from pipelines.commands.outcome import DONE, Outcome
-from pipelines.commands.search_catalogue import Catalogue, Motion
+from pipelines.commands.search_catalogue import NamedMotion, SearchCatalogue
 from pipelines.commands.search_report import draw, hit_facts, report
 from pipelines.studio.files import StudioError
 
@@ -30,7 +30,7 @@ PINNED_BY_LIKENESS = 5
 
 
 @dataclass(frozen=True)
-class Wish:
+class MotionQuery:
     """What is searched for.
 
     Parameters
@@ -54,14 +54,14 @@ class Wish:
 
 
 def search(
-    root: Path, wish: Wish, *, sheet: Path | None = None, train: bool = False, progress: Callable[[], Any]
+    root: Path, wish: MotionQuery, *, sheet: Path | None = None, train: bool = False, progress: Callable[[], Any]
 ) -> Outcome:
     """Find the clips most like a motion.
 
     Parameters
     ----------
     root : the studio
-    wish : Wish
+    wish : MotionQuery
     sheet : where to draw query and hits, a PNG
     train : train the encoder anew first
     progress : makes the bar of long steps
@@ -79,13 +79,13 @@ def search(
         raise StudioError("search: want a clip, a BVH file or --like, got nothing to look for")
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise StudioError(f"--sheet: want a file ending in .png, got {sheet.name!r}")
-    catalogue = Catalogue(root)
+    catalogue = SearchCatalogue(root)
     if train or not catalogue.is_current() or not all(catalogue.knows(t) for t in _texts(wish)):
         from pipelines.commands.searchable import make_searchable  # Dagster
 
         del catalogue  # Windows replaces no file that is mapped
         make_searchable(root, train=train, progress=progress)
-        catalogue = Catalogue(root)
+        catalogue = SearchCatalogue(root)
         catalogue.remember()
     index = catalogue.index
     if index is None or not len(index.vector):
@@ -137,16 +137,16 @@ def by_likeness(root: Path, pin: str, *, progress: Callable[[], Any]) -> str:
     if not wish.strip().startswith("like:"):
         return pin
     name = wish.partition(":")[2].strip()
-    found = search(root, Wish(query=name, k=PINNED_BY_LIKENESS), progress=progress).facts
+    found = search(root, MotionQuery(query=name, k=PINNED_BY_LIKENESS), progress=progress).facts
     own = [found["clip_id"]] if found["clip_id"] else []
     return f"{place.strip()}=clip:{','.join([*own, *(hit['clip_id'] for hit in found['hits'])])}"
 
 
 def _find(
     index: StoredIndex,
-    query: Motion | None,
-    like: Sequence[Motion],
-    unlike: Sequence[Motion],
+    query: NamedMotion | None,
+    like: Sequence[NamedMotion],
+    unlike: Sequence[NamedMotion],
     is_allowed: NDArray[np.bool_],
     k: int,
     copies: Copies | None,
@@ -168,7 +168,7 @@ def _find(
     return found
 
 
-def _copies(catalogue: Catalogue, query: Motion) -> Copies:
+def _copies(catalogue: SearchCatalogue, query: NamedMotion) -> Copies:
     """Prepare the search for copies of a motion; stretches of its own clip are none."""
     index = catalogue.index
     assert index is not None
@@ -194,7 +194,7 @@ def _is_approximate(index: StoredIndex, is_allowed: NDArray[np.bool_]) -> bool:
     return bool(index.approximate) and int(is_allowed.sum()) > motion_index.EXACT_UP_TO
 
 
-def _centre(motion: Motion) -> NDArray[np.float32]:
+def _centre(motion: NamedMotion) -> NDArray[np.float32]:
     total = motion.vector.astype(np.float64).sum(axis=0)
     return np.asarray(total / max(float(np.linalg.norm(total)), 1e-12), np.float32)
 
@@ -205,11 +205,11 @@ def _starts(clip_id: pa.ChunkedArray) -> NDArray[np.int64]:
     return np.flatnonzero(is_new)
 
 
-def _texts(wish: Wish) -> list[str]:
+def _texts(wish: MotionQuery) -> list[str]:
     return [text for text in (wish.query, *wish.like, *wish.unlike) if text]
 
 
-def _allowed(rows: pa.Table, wish: Wish) -> NDArray[np.bool_]:
+def _allowed(rows: pa.Table, wish: MotionQuery) -> NDArray[np.bool_]:
     """Which windows may be found; StudioError where a filter names what there is not."""
     is_allowed = np.full(rows.num_rows, True)
     for name in ("label", "style", "licence"):
@@ -229,7 +229,7 @@ def _allowed(rows: pa.Table, wish: Wish) -> NDArray[np.bool_]:
     return np.asarray(is_allowed & (duration_s >= wish.min_seconds) & (duration_s <= wish.max_seconds), bool)
 
 
-def _overlap(rows: pa.Table, motion: Motion) -> NDArray[np.bool_]:
+def _overlap(rows: pa.Table, motion: NamedMotion) -> NDArray[np.bool_]:
     """Windows that are the query itself."""
     is_own = pc.equal(rows["clip_id"], motion.clip_id).to_numpy(zero_copy_only=False)
     start_s, end_s = rows["start_s"].to_numpy(), rows["end_s"].to_numpy()

@@ -34,7 +34,7 @@ _MADE_FROM = ("clip", "canonical_pose", MOTION_ENCODER.name, MOTION_EMBEDDING.na
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class NamedMotion:
     """One motion named in a wish.
 
     Parameters
@@ -71,7 +71,7 @@ def parse(text: str) -> tuple[str, float, float]:
     return ranged["name"], start_s, end_s
 
 
-class Catalogue:
+class SearchCatalogue:
     """The search index of a studio, and what it takes to embed a query."""
 
     def __init__(self, root: Path) -> None:
@@ -117,7 +117,7 @@ class Catalogue:
         said: dict[str, Any] = json.loads(metadata.get(b"provenance", b"{}"))
         return said
 
-    def motion(self, text: str) -> Motion:
+    def motion(self, text: str) -> NamedMotion:
         """Embed a motion named in a wish.
 
         Raises
@@ -135,7 +135,7 @@ class Catalogue:
         clip_id, duration_s = rows["clip_id"][0].as_py(), rows["duration_s"][0].as_py()
         if start_s == 0 and end_s == float("inf"):
             at = rows["row_index"].to_numpy()
-            return Motion(text, clip_id, 0.0, duration_s, np.asarray(self.index.vector[at[0] : at[-1] + 1]))
+            return NamedMotion(text, clip_id, 0.0, duration_s, np.asarray(self.index.vector[at[0] : at[-1] + 1]))
         if start_s > duration_s:
             raise StudioError(
                 f"{text}: want a stretch within {clip_id}, {duration_s:.2f} s long; it begins after its end"
@@ -155,11 +155,11 @@ class Catalogue:
         table = pq.read_table(path, columns=["time_s", "position_xyz_m"], filters=pc.field("clip_id") == clip_id)
         return pack.to_array(table["position_xyz_m"]), pack.frame_rate_hz(table)
 
-    def _embed(self, text: str, clip_id: str, poses: tuple[Float, float], start_s: float, end_s: float) -> Motion:
+    def _embed(self, text: str, clip_id: str, poses: tuple[Float, float], start_s: float, end_s: float) -> NamedMotion:
         settings = read_settings(self.root / "odori.toml").search
         longest = max(settings.longest_whole_s, settings.window_s)
         cut = start_s + windows(end_s - start_s, window_s=settings.window_s, longest_whole_s=longest)
-        return Motion(text, clip_id, start_s, end_s, self._encoder().embed(*poses, cut), poses)
+        return NamedMotion(text, clip_id, start_s, end_s, self._encoder().embed(*poses, cut), poses)
 
     def _encoder(self) -> Encoder:
         return from_arrays(search_tables.to_encoder(pq.read_table(self._encoder_path())))
@@ -186,7 +186,7 @@ class Catalogue:
                 return path.relative_to(root).as_posix()
         return ""
 
-    def _outside(self, text: str, path: Path, start_s: float, end_s: float) -> Motion:
+    def _outside(self, text: str, path: Path, start_s: float, end_s: float) -> NamedMotion:
         """Read a file that is not of the catalogue, and bring it to the canonical skeleton."""
         joints = read_settings(self.root / "odori.toml").joints
         try:

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from kernels.search.nearest import Hit
-from pipelines.commands.search_catalogue import Catalogue, Motion
+from pipelines.commands.search_catalogue import NamedMotion, SearchCatalogue
 from pipelines.studio.files import write_beside
 
 
@@ -56,14 +56,14 @@ def _laid(hit: dict[str, Any]) -> str:
     return "" if apart_m is None else f", joints {100 * apart_m:.1f} cm off"
 
 
-def draw(sheet: Path, catalogue: Catalogue, query: Motion, found: Sequence[Hit]) -> None:
+def draw(sheet: Path, catalogue: SearchCatalogue, query: NamedMotion, found: Sequence[Hit]) -> None:
     """Draw the query and its hits, one strip each.
 
     Parameters
     ----------
     sheet : where the PNG goes
-    catalogue : Catalogue, that was searched
-    query : Motion
+    catalogue : SearchCatalogue, that was searched
+    query : NamedMotion
     found : hits, nearest first
     """
     from assets.plots.search import contact_sheet

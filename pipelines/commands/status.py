@@ -9,7 +9,7 @@ from pipelines import build as building
 from pipelines.collection import freshness
 from pipelines.commands import device_report
 from pipelines.commands.outcome import DONE, SOME_REFUSED, Outcome
-from pipelines.freshness import Finding, Freshness
+from pipelines.freshness import Freshness, PartitionState
 from pipelines.studio.folder import StudioFolder, existing
 from schemas.motion import CANONICAL_POSE
 from schemas.music import SONG
@@ -42,7 +42,7 @@ def status(root: Path, *, devices: bool = False) -> Outcome:
     return Outcome(SOME_REFUSED if refused else DONE, facts, report)
 
 
-def _asset_facts(finding: Finding, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:
+def _asset_facts(finding: PartitionState, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:
     failure = failures.get((finding.asset, finding.key)) if finding.state in ("stale", "missing") else None
     return {
         "asset": finding.asset,

@@ -12,7 +12,7 @@ from assets.formats.file_names import WINDOWS, file_name, key_of
 from assets.formats.settings import read_settings
 from assets.formats.tree import HashCache
 from assets.sources import scan, sources
-from assets.sources.sources import Request, Song, Sources
+from assets.sources.sources import Request, SongFile, Sources
 from pipelines.studio.files import StudioError, why, write_beside
 from pipelines.studio.lake import Lake
 from schemas.settings import Brief, Settings
@@ -45,7 +45,7 @@ class StudioFolder:
         """Read ``odori.toml``."""
         return read_settings(self.root / "odori.toml")
 
-    def brief(self, song: Song) -> Brief:
+    def brief(self, song: SongFile) -> Brief:
         """Read a song's brief; every default where it has none."""
         return sources.read_brief(self, song)
 

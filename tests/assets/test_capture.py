@@ -7,7 +7,7 @@ import pytest
 from assets.capture import _Reader
 from assets.formats import bvh
 from assets.formats.clips_csv import Facts
-from assets.sources.sources import Clip
+from assets.sources.sources import ClipFile
 from kernels.synthetic.dancer import take
 from pipelines.resources import NoProgress
 from schemas.settings import Limits, Settings
@@ -25,7 +25,7 @@ def test_the_largest_clip_is_the_settings_not_the_readers(tmp_path, monkeypatch,
     reader = _Reader(
         studio, SimpleNamespace(), SimpleNamespace(stamp=lambda *_: None, table=lambda *_: None), NoProgress(), "1"
     )
-    parts = reader.read("s", (Clip("s-step", "s", "step.bvh", "0", Facts()),))
+    parts = reader.read("s", (ClipFile("s-step", "s", "step.bvh", "0", Facts()),))
     assert asked == [{"max_bytes": round(largest_clip_mb * 1e6)}]
     (row,) = parts["clip"].table.to_pylist()
     assert row["state"] == ("refused" if largest_clip_mb < 0.1 else "read")

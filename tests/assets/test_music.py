@@ -8,7 +8,7 @@ import pytest
 from assets.formats import midi
 from assets.formats.errors import FormatError
 from assets.music import listen
-from assets.sources.sources import Song
+from assets.sources.sources import SongFile
 from kernels.music.notes import sorted_notes
 from schemas.settings import Brief, Limits, Settings
 
@@ -23,7 +23,7 @@ def studio(tmp_path):
 
 @pytest.mark.parametrize(("limit_s", "is_read"), [(10.0, False), (30.0, True)])
 def test_the_longest_song_counts_for_midi_too(studio, limit_s, is_read):
-    song, settings = Song("long", "long.mid", "0", "midi"), Settings(limits=Limits(longest_song_s=limit_s))
+    song, settings = SongFile("long", "long.mid", "0", "midi"), Settings(limits=Limits(longest_song_s=limit_s))
     if is_read:
         assert listen(song, studio, settings).duration_s >= 20
     else:

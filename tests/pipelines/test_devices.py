@@ -10,7 +10,7 @@ import pytest
 from kernels.opencl import choice, device
 from kernels.opencl.device import list_devices
 from pipelines import devices as module
-from pipelines.devices import REFERENCE, DeviceError, Devices, Memory, OnDevice, found_devices, try_alone
+from pipelines.devices import REFERENCE, DeviceError, Devices, OnDevice, TrialMemory, found_devices, try_alone
 
 pytestmark = pytest.mark.opencl
 KINDS = cl.device_type
@@ -53,7 +53,7 @@ def said():
 @pytest.fixture
 def devices(said, tmp_path):
     """Make the devices as a command does, telling a list."""
-    return lambda wanted="": Devices(wanted, say=said.append, memory=Memory(tmp_path))
+    return lambda wanted="": Devices(wanted, say=said.append, memory=TrialMemory(tmp_path))
 
 
 def test_a_platform_whose_builds_fail_gives_way_to_the_next(machine, devices, said):
@@ -164,7 +164,7 @@ def test_a_damaged_memory_is_no_memory(machine, devices, tmp_path, held):
 def test_a_memory_that_cannot_be_kept_is_no_trouble(machine, tmp_path):
     tried = machine(Stub("CPU"))
     (tmp_path / "odori").write_text("a file where the folder should be")
-    for memory in (Memory(tmp_path), Memory(None)):
+    for memory in (TrialMemory(tmp_path), TrialMemory(None)):
         assert Devices(memory=memory).in_use().name == "CPU"
     assert len(tried) == 2
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from assets.dancing.licences import Terms, free_to_join, is_allowed, may_be_joined, report, terms_of, together
+from assets.dancing.licences import LicenceTerms, free_to_join, is_allowed, may_be_joined, report, terms_of, together
 
 
 @pytest.mark.parametrize(
@@ -39,12 +39,12 @@ def test_terms(licence, words):
 
 
 def test_most_restrictive_wins():
-    assert together(["CC0-1.0", "CC-BY-4.0", "CC0-1.0"]) == ("CC-BY-4.0", Terms(attribution=True))
+    assert together(["CC0-1.0", "CC-BY-4.0", "CC0-1.0"]) == ("CC-BY-4.0", LicenceTerms(attribution=True))
     name, terms = together(["CC-BY-SA-4.0", "CC-BY-NC-4.0"])
     assert name == "CC-BY-NC-4.0"
     assert terms.words() == ["non commercial", "share alike", "attribution"]
     assert together(["", "CC-BY-NC-4.0"])[0] == "studio"
-    assert together([]) == ("", Terms())
+    assert together([]) == ("", LicenceTerms())
     assert together(["MIT", "CC0-1.0"])[0] == together(["CC0-1.0", "MIT"])[0]
 
 

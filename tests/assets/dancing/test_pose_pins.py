@@ -7,7 +7,7 @@ import polars as pl
 import pyarrow as pa
 import pytest
 
-from assets.dancing.pose_pins import Poses, moment_of, shown_pose, to_pose_pins
+from assets.dancing.pose_pins import ClipPoses, moment_of, shown_pose, to_pose_pins
 from assets.dancing.wishes import DirectionError
 from assets.reading.songs import PlayedSong
 from assets.stamps import ClipStamp, Stamp
@@ -62,7 +62,7 @@ def poses():
     rows = {}
     for name, how in CLIPS.items():
         rows[name] = from_canonical_pose(name, RATE_HZ, CanonicalClip(name, RATE_HZ, *swinging(*how)))
-    return Poses(InMemory(rows))
+    return ClipPoses(InMemory(rows))
 
 
 @pytest.fixture(scope="module")
@@ -106,12 +106,12 @@ def test_the_pose_itself_is_free_and_others_pay_by_their_distance(graph, poses):
 
 @pytest.mark.parametrize(("wished_s", "beat_s"), [(1.8, 1.7), (1.99, 2.2), (0.0, 0.2)])
 def test_between_beats_the_nearest_of_its_own_clip_is_admitted(graph, poses, wished_s, beat_s):
-    price = pins(f"2=pose:day-a@{wished_s}", song_of(0.0), graph, Poses(poses.stored, 1e-9)).steps[4, ONE]
+    price = pins(f"2=pose:day-a@{wished_s}", song_of(0.0), graph, ClipPoses(poses.stored, 1e-9)).steps[4, ONE]
     assert graph.time_s[np.flatnonzero(np.isfinite(price))].tolist() == pytest.approx([beat_s])
 
 
 def test_where_nothing_is_near_the_nearest_are_admitted(graph, poses):
-    price = pins("2=pose:day-c@1.0", song_of(0.0), graph, Poses(poses.stored, 1e-9)).steps[4, ONE]
+    price = pins("2=pose:day-c@1.0", song_of(0.0), graph, ClipPoses(poses.stored, 1e-9)).steps[4, ONE]
     assert np.isfinite(price).sum() == 20
 
 
@@ -211,7 +211,7 @@ def test_told_of_a_finished_dance(graph, poses, clip, at_s, is_kept):
         "dance", RATE_HZ, shown.root_xyz_m[frame], shown.rotation_wxyz[frame], shown.position_xyz_m[frame]
     )
     wish = parse_pin("2=pose:day-a@1.7")
-    told = shown_pose(wish, 2.0, lineage(clip, at_s), dance, Poses(poses.stored, 0.3), nodes)
+    told = shown_pose(wish, 2.0, lineage(clip, at_s), dance, ClipPoses(poses.stored, 0.3), nodes)
     assert told["is_kept"] is is_kept
     assert (told["shown_clip_id"], told["at_s"], told["is_mirrored"]) == (clip, 2.0, False)
     assert told["shown_time_s"] == pytest.approx(at_s)

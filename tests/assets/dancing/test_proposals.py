@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from assets.dancing.asked import Direction
-from assets.dancing.by_graph import Catalogue, by_graph
+from assets.dancing.by_graph import GraphCatalogue, by_graph
 from assets.dancing.proposals import place_of, propose
 from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import DirectionError, Nodes
@@ -44,7 +44,7 @@ def known():
     of = graph.clip_index
     label, style = np.array(["spin", "walk", "spin", "jump", "crawl"]), np.array(["hip", "", "hop", "hip", ""])
     names = tuple("abcde")
-    return Catalogue(graph, names, Nodes(np.array(names)[of], label[of], style[of]), np.ones(len(of), bool))
+    return GraphCatalogue(graph, names, Nodes(np.array(names)[of], label[of], style[of]), np.ones(len(of), bool))
 
 
 def test_places(song):

@@ -5,7 +5,7 @@ import pytest
 from pxr import Usd, UsdSkel
 
 from assets.formats import usd, usd_check, usd_package
-from assets.formats.usd_contract import Finding
+from assets.formats.usd_contract import StageFinding
 from schemas import usd as contract
 
 
@@ -133,5 +133,5 @@ def test_stages_of_other_hands_are_told_what_they_lack(data_dir, name, wanted, u
 
 
 def test_a_finding_is_plain_data():
-    finding = Finding("error", "odori:unit", "/Dance", "metersPerUnit: want 1, got 0.01")
-    assert {finding} == {Finding("error", "odori:unit", "/Dance", "metersPerUnit: want 1, got 0.01")}
+    finding = StageFinding("error", "odori:unit", "/Dance", "metersPerUnit: want 1, got 0.01")
+    assert {finding} == {StageFinding("error", "odori:unit", "/Dance", "metersPerUnit: want 1, got 0.01")}

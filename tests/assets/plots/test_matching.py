@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from assets.dancing.match_pieces import Piece
+from assets.dancing.match_pieces import MatchPiece
 from assets.plots import matching as mp
 from assets.tables import matching as mt
 from kernels.matching.path import Chosen
@@ -55,7 +55,7 @@ def test_curves_over_each_other():
 
 
 def test_a_seam_beyond_the_thresholds_is_plain_to_see():
-    pieces = [Piece("s-a", 0.0, 2.0, 1, 0.1, 0.2, 0.0), Piece("s-b", 1.0, 2.5, 0, 1.0, 1.0, 0.0)]
+    pieces = [MatchPiece("s-a", 0.0, 2.0, 1, 0.1, 0.2, 0.0), MatchPiece("s-b", 1.0, 2.5, 0, 1.0, 1.0, 0.0)]
     no = np.array([False, True])
     found = Chosen(np.array([0, 0]), no, ~no, np.array([0, 0.5]), np.zeros(2), 2.8)
     text = mp.chosen(np.array([0.0, 2.0, 3.5]), pieces, found)

@@ -8,9 +8,9 @@ import pytest
 from assets.formats.clips_csv import Facts
 from assets.formats.errors import FormatError
 from assets.sources.sources import (
-    Clip,
+    ClipFile,
     Request,
-    Song,
+    SongFile,
     Sources,
     brief_of,
     brief_version,
@@ -23,8 +23,8 @@ from assets.sources.sources import (
 from pipelines.studio.folder import StudioFolder
 from schemas.settings import Brief
 
-CLIP = Clip("s-a", "s", "clips/s/a.bvh", "ab", Facts(label="spin"))
-SONG = Song("waltz", "songs/waltz.wav", "cd", "audio", "songs/waltz.brief.toml")
+CLIP = ClipFile("s-a", "s", "clips/s/a.bvh", "ab", Facts(label="spin"))
+SONG = SongFile("waltz", "songs/waltz.wav", "cd", "audio", "songs/waltz.brief.toml")
 
 
 @pytest.fixture

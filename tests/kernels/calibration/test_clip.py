@@ -6,7 +6,7 @@ import pytest
 from kernels import rotation
 from kernels.calibration import clip as clip_module
 from kernels.calibration.clip import find_gauge, to_clip
-from kernels.calibration.records import SENSORS, Poses
+from kernels.calibration.records import SENSORS, BodyPoses
 from kernels.skeleton import kinematics
 from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget
@@ -82,6 +82,6 @@ def test_names_are_known_and_retargeting_goes_through(poses):
 
 
 def test_no_frame_is_refused():
-    none = Poses(SENSORS, np.zeros((0, 17, 3)), np.zeros((0, 17, 4)), np.zeros((0, 16)), np.zeros((0, 16)))
+    none = BodyPoses(SENSORS, np.zeros((0, 17, 3)), np.zeros((0, 17, 4)), np.zeros((0, 16)), np.zeros((0, 16)))
     with pytest.raises(ValueError, match="at least one frame"):
         find_gauge(none, 120.0)

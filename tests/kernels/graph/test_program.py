@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from kernels.graph.costs import PathCosts
-from kernels.graph.program import Program
+from kernels.graph.program import PathProgram
 
 
 @pytest.fixture
@@ -16,7 +16,7 @@ def make_program(make_graph):
             "outside_price": 0.0,
         }
         graph = make_graph(beats, transitions, both_ways=False)
-        return Program(graph, 0.5 * np.arange(intervals + 1), **(arguments | change))
+        return PathProgram(graph, 0.5 * np.arange(intervals + 1), **(arguments | change))
 
     return make
 

@@ -6,14 +6,14 @@ import pytest
 from kernels.graph.costs import PathCosts
 from kernels.graph.path import STEPS, InfeasiblePathError, find_path
 from kernels.graph.pins import Pin, admitted
-from kernels.graph.program import Program
+from kernels.graph.program import PathProgram
 from kernels.graph.proposals import Proposals
 
 COSTS = PathCosts(usage=0.0)
 
 
 def proposals_of(graph, beat_s, starts, admissible=None, **prices):
-    program = Program(
+    program = PathProgram(
         graph,
         beat_s,
         steps=STEPS,

@@ -8,7 +8,7 @@ import pytest
 from kernels.graph.costs import PathCosts, hurry_cost
 from kernels.graph.path import STEPS, InfeasiblePathError, find_path
 from kernels.graph.pins import Pin, admitted
-from kernels.graph.program import Program
+from kernels.graph.program import PathProgram
 from kernels.graph.proposals import Proposals
 
 
@@ -79,7 +79,7 @@ def test_ties_go_by_one_rule(seed, make_graph, every_dance):
 def test_a_proposal_costs_what_its_pin_costs(seed, make_random_graph, every_dance):
     graph, beat_s, costs, mask, starts = random_case(seed, make_random_graph)
     n, n_nodes = mask.shape
-    program = Program(
+    program = PathProgram(
         graph, beat_s, steps=STEPS, costs=costs, admissible=mask, bounds=costs.hard_ratio, outside_price=0.0
     )
     found = Proposals(program, starts)
@@ -134,7 +134,7 @@ def test_windows_agree_with_the_whole(seed, make_random_graph):
         exact = find_path(graph, beat_s, costs=costs)
     except InfeasiblePathError:
         pytest.skip("this seed's graph has no dance of 40 beats")
-    program = Program(
+    program = PathProgram(
         graph, beat_s, steps=STEPS, costs=costs, admissible=None, bounds=costs.last_resort_ratio, outside_price=1e5
     )
     whole = program.solve(0, 40, after={40: program.at_the_end})

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from kernels.hmm.places import CROWDED, MISSED_BEAT, Places, Wish, crowded_cost, finishing, keep_wishes, missed_beats
+from kernels.hmm.places import (
+    CROWDED,
+    MISSED_BEAT,
+    MotionWish,
+    Places,
+    crowded_cost,
+    finishing,
+    keep_wishes,
+    missed_beats,
+)
 from kernels.hmm.viterbi import InfeasibleSpansError
 
 
@@ -16,7 +25,7 @@ def test_beats_passed_and_beats_ended_on():
 def test_wishes_close_or_price_what_they_do_not_admit(some_motions, places_of):
     motions = some_motions()
     places = places_of(motions)
-    wish = Wish(1, 3, np.arange(6) < 3)
+    wish = MotionWish(1, 3, np.arange(6) < 3)
     kept = keep_wishes(places, [wish])
     assert set(kept.at[1][1][0].tolist()) == {0, 1, 2}
     assert set(kept.at[3][1][0].tolist()) == set(range(6))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kernels.matching.catalogue import Catalogue, Chunk, Song, check_search, portions
+from kernels.matching.catalogue import Chunk, MatchCatalogue, SongLayout, check_search, portions
 from kernels.matching.score import Match, reference_matches
 
 FIFTIETHS = tuple(range(45, 56))
@@ -58,7 +58,7 @@ def test_silent_clips_stand_aside():
 def test_silence_is_answered_by_the_tie_rule():
     segments = [np.ones(4), np.zeros(3)]
     clips = [np.zeros(9), np.ones(3), np.zeros(2), np.zeros(9)]
-    song, chunk = Song(segments, k=3, fiftieths=FIFTIETHS), Chunk(5, clips)
+    song, chunk = SongLayout(segments, k=3, fiftieths=FIFTIETHS), Chunk(5, clips)
     none = np.full(2, -1.0)
     found = song.with_silences([[], []], chunk, floor=none)
     expected = reference_matches(segments, clips, k=3)
@@ -68,7 +68,7 @@ def test_silence_is_answered_by_the_tie_rule():
 
 
 def test_what_was_found_goes_before_silence():
-    song, chunk = Song([np.ones(2)], k=2, fiftieths=FIFTIETHS), Chunk(0, [np.zeros(4), np.ones(4)])
+    song, chunk = SongLayout([np.ones(2)], k=2, fiftieths=FIFTIETHS), Chunk(0, [np.zeros(4), np.ones(4)])
     best = Match(0, 0, 1, 3, 0, 1.0, 1.0, 1.0)
     (found,) = song.with_silences([[best]], chunk, floor=np.array([-1.0]))
     assert [(m.rank_number, m.clip_index) for m in found] == [(1, 1), (2, 0)]
@@ -77,7 +77,7 @@ def test_what_was_found_goes_before_silence():
 def test_the_reference_counts_through_the_catalogue():
     rng = np.random.default_rng(0)
     clips, segment = [rng.random(30), np.zeros(30), rng.random(30)], rng.random(12)
-    song, chunk = Song([np.ones(1), segment], k=2, fiftieths=FIFTIETHS), Chunk(10, clips)
+    song, chunk = SongLayout([np.ones(1), segment], k=2, fiftieths=FIFTIETHS), Chunk(10, clips)
     expected = reference_matches([segment], clips, k=2)[0]
     assert [(m.segment_index, m.clip_index, m.score) for m in song.by_reference(1, chunk)] == [
         (1, m.clip_index + 10, m.score) for m in expected
@@ -95,7 +95,7 @@ def test_questions_without_an_answer_are_refused():
         check_search([-good[0]], good, **ask)
     with pytest.raises(ValueError, match="floors: want one a segment, 1, got 2"):
         check_search(good, good, **{**ask, "floors": [0, 1]})
-    other = Catalogue([Chunk(0, good)], fiftieths=(50,), is_resident=True)
+    other = MatchCatalogue([Chunk(0, good)], fiftieths=(50,), is_resident=True)
     assert len(other) == 1
     with pytest.raises(ValueError, match="clips: want an index for the scales"):
         check_search(good, other, **ask)

@@ -6,8 +6,8 @@ import pytest
 from kernels.matching.connect import (
     LEAST_POSE_RAD,
     LEAST_SPEED_RAD_PER_S,
+    ConnectionThresholds,
     JointPoses,
-    Thresholds,
     calibrate,
     connects,
     differences,
@@ -84,26 +84,26 @@ def test_one_frame_has_a_pose_and_no_velocity():
 def test_each_clip_has_the_same_say_however_long_it_is():
     short = (np.full(20, 0.4), np.full(20, 4.0))
     long = (np.full(2000, 0.1), np.full(2000, 1.0))
-    assert calibrate([short, long]) == calibrate([long, short]) == Thresholds(0.4, 4.0)
+    assert calibrate([short, long]) == calibrate([long, short]) == ConnectionThresholds(0.4, 4.0)
 
 
 def test_thresholds_are_the_95th_percentile():
     pose, speed = np.arange(1, 101) / 100, np.arange(100, 0, -1.0)
-    assert calibrate([(pose, speed)]) == Thresholds(0.95, 95.0)
+    assert calibrate([(pose, speed)]) == ConnectionThresholds(0.95, 95.0)
 
 
 def test_a_clip_that_tells_nothing_does_not_count():
     told = (np.full(5, 0.3), np.full(5, 2.0))
-    assert calibrate([(np.zeros(0), np.zeros(0)), told]) == Thresholds(0.3, 2.0)
+    assert calibrate([(np.zeros(0), np.zeros(0)), told]) == ConnectionThresholds(0.3, 2.0)
 
 
 def test_each_threshold_has_its_own_floor():
-    assert calibrate([(np.full(5, 0.01), np.full(5, 2.0))]) == Thresholds(LEAST_POSE_RAD, 2.0)
-    assert calibrate([(np.full(5, 0.3), np.full(5, 0.01))]) == Thresholds(0.3, LEAST_SPEED_RAD_PER_S)
+    assert calibrate([(np.full(5, 0.01), np.full(5, 2.0))]) == ConnectionThresholds(LEAST_POSE_RAD, 2.0)
+    assert calibrate([(np.full(5, 0.3), np.full(5, 0.01))]) == ConnectionThresholds(0.3, LEAST_SPEED_RAD_PER_S)
 
 
 def test_a_difference_at_its_threshold_connects_and_both_must():
-    limits = Thresholds(0.5, 2.0)
+    limits = ConnectionThresholds(0.5, 2.0)
     pose, speed = np.array([0.5, 0.5, 0.51, 0.1]), np.array([2.0, 2.01, 0.1, 0.1])
     np.testing.assert_array_equal(connects(pose, speed, limits), [True, False, False, True])
 

@@ -9,7 +9,7 @@ from kernels.matching.score import merge_matches, reference_matches
 from kernels.opencl import match as module
 from kernels.opencl.device import list_devices
 from kernels.opencl.match import Matcher
-from kernels.opencl.match_program import Program
+from kernels.opencl.match_program import MatchProgram
 
 DEVICES = list_devices()
 pytestmark = [pytest.mark.opencl, pytest.mark.skipif(not DEVICES, reason="no OpenCL device here")]
@@ -18,7 +18,7 @@ PRUNED = PLANS[0]
 
 @pytest.fixture(scope="module", params=range(len(DEVICES)), ids=[device.name.strip() for device in DEVICES])
 def program(request):
-    return Program(cl.Context([DEVICES[request.param]]))
+    return MatchProgram(cl.Context([DEVICES[request.param]]))
 
 
 def smooth(rng, n):
@@ -86,7 +86,7 @@ def test_features_of_very_different_sizes(program, size):
 def test_width_of_vectors_and_bundles_changes_nothing(program, lanes, together):
     segments, clips = make("smooth", 3)
     expected = reference_matches(segments, clips, k=4)
-    other = Program(program.context, lanes=lanes, together=together)
+    other = MatchProgram(program.context, lanes=lanes, together=together)
     assert Matcher(program=other, plan=PRUNED).matches(segments, clips, k=4) == expected
     assert Matcher(program=other, plan=BRUTE).matches(segments, clips, k=4) == expected
 

@@ -3,7 +3,7 @@ import pyopencl as cl
 import pytest
 
 from kernels.opencl.device import list_devices
-from kernels.opencl.match_program import Program
+from kernels.opencl.match_program import MatchProgram
 
 DEVICES = list_devices()
 pytestmark = [pytest.mark.opencl, pytest.mark.skipif(not DEVICES, reason="no OpenCL device here")]
@@ -11,7 +11,7 @@ pytestmark = [pytest.mark.opencl, pytest.mark.skipif(not DEVICES, reason="no Ope
 
 @pytest.fixture(scope="module")
 def program():
-    return Program(cl.Context([DEVICES[0]]))
+    return MatchProgram(cl.Context([DEVICES[0]]))
 
 
 def test_copies_there_and_back(program):
@@ -30,4 +30,4 @@ def test_too_large_a_buffer_is_out_of_memory(program):
 def test_names_its_device_and_refuses_two(program):
     assert DEVICES[0].name.strip() in program.name
     with pytest.raises(ValueError, match="want one device, got 2"):
-        Program(type("Context", (), {"devices": [DEVICES[0]] * 2})())
+        MatchProgram(type("Context", (), {"devices": [DEVICES[0]] * 2})())

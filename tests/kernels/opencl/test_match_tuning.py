@@ -5,7 +5,7 @@ import pytest
 from kernels.matching.plan import BRUTE_SPARSE
 from kernels.matching.score import SCALE_NUMERATORS, start_count, sums
 from kernels.opencl.device import list_devices
-from kernels.opencl.match_program import Program
+from kernels.opencl.match_program import MatchProgram
 from kernels.opencl.match_stages import Stages
 from kernels.opencl.match_tables import Tables
 from kernels.opencl.match_tuning import pick_plan, worth_trying
@@ -16,7 +16,7 @@ pytestmark = [pytest.mark.opencl, pytest.mark.skipif(not DEVICES, reason="no Ope
 
 @pytest.fixture(scope="module")
 def program():
-    return Program(cl.Context([DEVICES[0]]))
+    return MatchProgram(cl.Context([DEVICES[0]]))
 
 
 @pytest.fixture

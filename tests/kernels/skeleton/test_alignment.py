@@ -27,7 +27,7 @@ def placed(motion, **plan):
     at = {name: clip.skeleton.index(name) for name in JOINTS if name in clip.skeleton.joints}
     spine, neck = topology.trunk(clip.skeleton, {name: name for name in at})
     rest = alignment.rest_position(clip)
-    return alignment.Rig(clip, at, spine, neck, rest, position, orientation)
+    return alignment.PlacedRig(clip, at, spine, neck, rest, position, orientation)
 
 
 def assert_neutral(rig, axes, limit_rad=1e-6, names=JOINTS):

@@ -80,7 +80,7 @@ def test_a_heel_that_lifts_leaves_the_toes_standing():
 def test_hysteresis_keeps_a_contact_that_flickers():
     ankle = walk(60)[0]
     wobble = 0.03 + 0.012 * np.sin(np.arange(len(ankle)) * 0.9)
-    tight = contacts.Thresholds(tight_height_m=0.03, loose_height_m=0.03)
+    tight = contacts.ContactThresholds(tight_height_m=0.03, loose_height_m=0.03)
     still = np.zeros_like(ankle)
     still[..., 1] = wobble[:, None]
     one = contacts.find_contacts(still, still, frame_rate_hz=60, planted_height_m=(0.0, 0.0), thresholds=tight)

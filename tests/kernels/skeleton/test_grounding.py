@@ -67,7 +67,7 @@ def test_a_floor_at_another_height_comes_to_zero(step):
 
 def test_legs_reach_a_little_and_never_beyond_the_limit(step):
     _, position, orientation, contacts = step
-    give = grounding.Give(leg_limit_rad=np.radians(2.0))
+    give = grounding.GroundingGive(leg_limit_rad=np.radians(2.0))
     for size_m in (0.004, 0.2):
         wobble = size_m * np.sin(np.arange(len(position)) / 4)[:, None] * np.array([1.0, 0.0, 0.0])
         shaken = position + wobble[:, None]

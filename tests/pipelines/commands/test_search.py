@@ -12,7 +12,7 @@ from assets.formats import bvh
 from kernels.synthetic.dancer import take
 from pipelines.commands import searchable as making
 from pipelines.commands.build import build_studio
-from pipelines.commands.search import Wish, by_likeness, search
+from pipelines.commands.search import MotionQuery, by_likeness, search
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError
 from pipelines.studio.folder import StudioFolder
@@ -23,7 +23,7 @@ TAKES = ("step", "twist", "wave")
 
 def ask(root, query="", **more):
     sheet, train = more.pop("sheet", None), more.pop("train", False)
-    return search(root, Wish(query=query, **more), sheet=sheet, train=train, progress=NoProgress).facts
+    return search(root, MotionQuery(query=query, **more), sheet=sheet, train=train, progress=NoProgress).facts
 
 
 def clips_of(outcome):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipelines.commands.search_catalogue import Catalogue, parse
+from pipelines.commands.search_catalogue import SearchCatalogue, parse
 from pipelines.studio.files import StudioError
 
 
@@ -26,11 +26,11 @@ def test_a_stretch_that_ends_before_it_begins_is_refused():
 
 def test_a_folder_that_is_not_there_is_said(tmp_path):
     with pytest.raises(StudioError, match="want a studio folder"):
-        Catalogue(tmp_path / "none")
+        SearchCatalogue(tmp_path / "none")
 
 
 def test_a_studio_never_searched_has_no_index(tmp_path):
-    catalogue = Catalogue(tmp_path)
+    catalogue = SearchCatalogue(tmp_path)
     assert catalogue.index is None
     assert not catalogue.is_current()
     assert not catalogue.knows("day-step")
