@@ -14,7 +14,7 @@ from assets.sources.sources import Studio
 from assets.stamps import Part, Parts, Progress, Stored
 from assets.tables import matching as matching_tables
 from assets.tables.matching import Rhythm, StoredMatches
-from kernels.matching.score import Match
+from kernels.matching.score import SCALE_DENOMINATOR, Match
 from kernels.music.segments import Segments
 from schemas.matching import MATCH
 
@@ -136,7 +136,7 @@ def _curves(
     best = stored[index]
     motions = []
     for rank in range(min(4, len(best.score))):
-        clip, scale = best.clip_ids[rank], best.numerator[rank] / 50
+        clip, scale = best.clip_ids[rank], best.numerator[rank] / SCALE_DENOMINATOR
         at = best.start_frame_index[rank] + scale * np.arange(len(parts[index]))
         motion = np.interp(at, np.arange(len(rhythms[clip])), rhythms[clip])
         name = f"{rank + 1}: {clip} at {scale:.2f}, C {best.score[rank]:.2f}, mutual {best.mutual_ratio[rank]:.2f}"

@@ -35,62 +35,6 @@ MOST_SHARING = 4
 
 REFERENCES = REPOSITORY / "docs" / "references.md"
 
-UNSAID: set[str] = {
-    "kernels/matching/blocks.py",
-    "kernels/matching/bounds.py",
-    "kernels/matching/candidates.py",
-    "kernels/matching/catalogue.py",
-    "kernels/matching/chunked.py",
-    "kernels/matching/connect.py",
-    "kernels/matching/intensity.py",
-    "kernels/matching/low_rank.py",
-    "kernels/matching/numpy_search.py",
-    "kernels/matching/path.py",
-    "kernels/matching/pieces.py",
-    "kernels/matching/plan.py",
-    "kernels/matching/refinement.py",
-    "kernels/matching/score.py",
-    "kernels/opencl/match.py",
-    "kernels/opencl/match_finalists.py",
-    "kernels/opencl/match_program.py",
-    "kernels/opencl/match_stages.py",
-    "kernels/opencl/match_tables.py",
-    "kernels/opencl/match_tuning.py",
-    "kernels/opencl/pocl_target.py",
-    "kernels/opencl/pose_distance.py",
-    "kernels/opencl/spring_relaxation.py",
-    "kernels/opencl/tree_gauss_newton.py",
-    "kernels/opencl/trial.py",
-    "kernels/search/aligned.py",
-    "kernels/search/describe.py",
-    "kernels/search/discriminant.py",
-    "kernels/search/document.py",
-    "kernels/search/encoder.py",
-    "kernels/search/fit.py",
-    "kernels/search/nearest.py",
-    "kernels/search/network.py",
-    "kernels/search/normalise.py",
-    "kernels/search/train.py",
-    "kernels/search/windows.py",
-    "kernels/skeleton/alignment.py",
-    "kernels/skeleton/axes.py",
-    "kernels/skeleton/canonical.py",
-    "kernels/skeleton/character.py",
-    "kernels/skeleton/fit.py",
-    "kernels/skeleton/grounding.py",
-    "kernels/skeleton/topology.py",
-    "kernels/synthetic/arrangement.py",
-    "kernels/synthetic/dancer.py",
-    "kernels/synthetic/grooves.py",
-    "kernels/synthetic/medley.py",
-    "kernels/synthetic/music.py",
-    "kernels/synthetic/performance.py",
-    "kernels/synthetic/rigs.py",
-    "kernels/synthetic/suit.py",
-    "kernels/synthetic/suit_faults.py",
-}
-"""Files whose constants have no word yet; only shrinks."""
-
 
 def _holds_number(node):
     """Whether a value holds a number that is more than a place."""
@@ -151,11 +95,7 @@ def words(source):
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(REPOSITORY)))
 def test_every_number_says_where_it_is_from(path):
-    unsaid = [name for name, text in words(path.read_text(encoding="utf-8")).items() if not ORIGIN.search(text)]
-    if str(path.relative_to(REPOSITORY)) in UNSAID:
-        assert unsaid, "has its words: take it out of UNSAID"
-    else:
-        assert unsaid == []
+    assert [name for name, text in words(path.read_text(encoding="utf-8")).items() if not ORIGIN.search(text)] == []
 
 
 @pytest.mark.skipif(not REFERENCES.exists(), reason="no list of references")

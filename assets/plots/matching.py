@@ -12,6 +12,7 @@ from assets.plots.draw import COOL, INK, SOFT, WARM, figure_of, markdown, pictur
 from assets.tables.matching import StoredMatches
 from assets.tables.pack import by_clip, to_numbers
 from kernels.matching.path import Chosen
+from kernels.matching.score import SCALE_DENOMINATOR
 from kernels.motion.features import FEATURE_RATE_HZ
 from kernels.music.segments import Segments
 from kernels.types import Float
@@ -116,14 +117,14 @@ def segment_matches(segments: Segments, found: Sequence[StoredMatches]) -> str:
         score.plot(np.full(len(matches.score), middle[i]), matches.music_ratio, "_", color=SOFT, markersize=5)
         score.plot(middle[i], matches.music_ratio[0], "o", color=WARM, markersize=4)
         score.plot(middle[i], matches.mutual_ratio[0], "x", color=COOL, markersize=4)
-        scale.bar(middle[i], matches.numerator[0] / 50 - 1, width[i] * 0.9, color=INK)
+        scale.bar(middle[i], matches.numerator[0] / SCALE_DENOMINATOR - 1, width[i] * 0.9, color=INK)
         clip.barh(names.index(matches.clip_ids[0]), width[i], left=segments.start_s[i], height=0.8, color=COOL)
         rows.append(
             (
                 i,
                 f"{segments.start_s[i]:.2f} to {segments.end_s[i]:.2f}",
                 matches.clip_ids[0],
-                f"{matches.numerator[0] / 50:.2f}",
+                f"{matches.numerator[0] / SCALE_DENOMINATOR:.2f}",
                 f"{matches.start_frame_index[0] / FEATURE_RATE_HZ:.2f}",
                 float(matches.score[0]),
                 float(matches.mutual_ratio[0]),

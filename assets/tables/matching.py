@@ -11,7 +11,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from assets.tables.pack import by_clip, from_rows, to_numbers
-from kernels.matching.score import SCALES, Match
+from kernels.matching.score import SCALE_DENOMINATOR, SCALES, Match
 from kernels.motion.features import MotionFeatures
 from kernels.music.features import MusicFeatures
 from kernels.music.repeats import Repeat
@@ -300,7 +300,7 @@ def to_matches(table: pa.Table, n_segments: int) -> list[StoredMatches]:
         found.append(
             StoredMatches(
                 tuple(rows["clip_id"].to_pylist()),
-                np.rint(to_numbers(rows["scale_ratio"]).astype(np.float64) * 50).astype(np.int64),
+                np.rint(to_numbers(rows["scale_ratio"]).astype(np.float64) * SCALE_DENOMINATOR).astype(np.int64),
                 to_numbers(rows["start_frame_index"]).astype(np.int64),
                 *(to_numbers(rows[c]).astype(np.float64) for c in ("score", "music_ratio", "mutual_ratio")),
             )

@@ -18,10 +18,17 @@ from numpy.typing import NDArray
 
 from kernels.matching.score import SCALE_DENOMINATOR
 
-GROUP = 8  # starts bounded together
-UNIT = 2.0**-24  # the relative error of one rounded float32 operation
-TABLE_MARGIN = 1 + 116 * UNIT  # more than the error of summing 50 frames in float32: tables are true upper bounds
+GROUP = 8
+"""Starts bounded together at most. Chosen as the width of a vector of float32."""
+
+UNIT = 2.0**-24
+"""The relative error of one rounded float32 operation, by definition."""
+
+TABLE_MARGIN = 1 + 116 * UNIT
+"""By proof more than the error of summing 50 frames in float32: tables are true upper bounds (docs/matching.md)."""
+
 _PARENTS = {10: 5, 25: 5, 50: 25}
+"""Blocks by whose sums longer ones are made, frames. Chosen as divisors."""
 
 
 def parent(n_frames: int) -> int:

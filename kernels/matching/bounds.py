@@ -22,9 +22,13 @@ from numpy.typing import NDArray
 from kernels.matching.blocks import UNIT, block_sums, rows
 from kernels.matching.low_rank import RANK, codes, low_rank, window
 from kernels.matching.room import Room
+from kernels.matching.score import SCALE_DENOMINATOR
 
-_TILE = 4096  # positions summed at a time: rows of them stay in the cache
+_TILE = 4096
+"""Positions summed at a time. Chosen so that rows of them stay in the cache; changes no bound."""
+
 _TINY = 2.0**-95
+"""Added to what rounding may do. Chosen above what products of denormal numbers lose."""
 
 Series = NDArray[np.floating]
 
@@ -47,7 +51,7 @@ class SumTables:
 
     def __init__(self, clips: Sequence[Series], *, numerators: tuple[int, ...]) -> None:
         self.numerators = numerators
-        self.gap = 25 * numerators[-1] // 50 + 16  # silence between clips, longer than any block
+        self.gap = 25 * numerators[-1] // SCALE_DENOMINATOR + 16  # silence between clips, longer than any block
         self.frames = np.array([len(clip) for clip in clips], np.int64)
         stride = self.frames + self.gap
         self.first = np.cumsum(stride) - stride

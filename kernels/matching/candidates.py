@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from kernels.matching.room import Room
 from kernels.matching.score import SCALE_DENOMINATOR
 
-_TILE = 2**14  # numbers of a tile
+_TILE = 2**14
+"""Numbers summed at a time. Chosen so that they stay in the cache, by hand; changes no score."""
+
 _NOWHERE = 2**40
+"""A place beyond any clip, by definition: clips have at most 2^23 frames."""
 
 
 class Scores:

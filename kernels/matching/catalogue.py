@@ -25,7 +25,7 @@ from kernels.matching.score import (
 )
 
 LONGEST = 2**23
-"""Frames of the longest clip a search takes."""
+"""Frames of the longest clip a search takes: 19 hours at 120 Hz. Chosen below the 24 bits a place has."""
 
 Series = NDArray[np.floating]
 TablesT = TypeVar("TablesT")

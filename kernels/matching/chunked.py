@@ -13,7 +13,7 @@ from kernels.matching.catalogue import Chunk, MatchCatalogue, Series, SongLayout
 from kernels.matching.score import SCALES, Match, merge_matches, numerators
 
 MEMORY_BYTES = 2**31
-"""Memory a search takes where nobody says how much: it fits beside everything else on a workstation."""
+"""Memory a search takes where nobody says how much. Chosen to fit beside everything else on a workstation."""
 
 
 class ChunkedSearch(ABC, Generic[TablesT]):

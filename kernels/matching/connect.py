@@ -21,9 +21,13 @@ from kernels.motion.features import FEATURE_RATE_HZ
 from kernels.types import Float
 
 LIKE_NEIGHBOURS_PERCENTILE = 95.0
+"""Share of the pairs of neighbouring moments that pass. Chosen by hand, by convention of statistics."""
+
 LEAST_POSE_RAD, LEAST_SPEED_RAD_PER_S = 0.05, 0.25
+"""Thresholds are no lower, or clips that stand still would connect with nothing. Chosen by hand."""
+
 VELOCITY_SPAN = 2
-"""Frames on either side over which a velocity is taken, 17 ms each."""
+"""Frames on either side over which a velocity is taken, 17 ms in all. Chosen by hand."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from kernels.types import Float, Int
 
 N_BINS = 10
+"""Of a histogram of intensity. Chosen by hand: [Shiratori2006] and [Yagi2009] leave it open."""
 
 
 def quantile_edges(values: Float, *, n_bins: int = N_BINS) -> Float:

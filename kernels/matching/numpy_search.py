@@ -22,10 +22,19 @@ from kernels.matching.refinement import PAIRS, PLACE_BITS, STAGES, Refinement
 from kernels.matching.score import Match, ratios, sums_of_candidates
 
 _MOST_FRAMES = 2**30
-_TOGETHER = 512  # segments of one search
-_LONGER = 1.6  # times the shortest: the longest segment of one search
-_SPARSE = 0.25  # share of frames with music
-# largest values for which products neither overflow nor lose what a score is made of
+"""Frames of a chunk. Chosen below the range of int32."""
+
+_TOGETHER = 512
+"""Segments of one search. Chosen for memory, by hand; changes no answer."""
+
+_LONGER = 1.6
+"""Times the shortest: the longest segment of one search. Tuned on segments that all differ in length; changes no
+answer."""
+
+_SPARSE = 0.25
+"""Share of frames with music below which a segment is searched with its like. Chosen by hand; changes no answer."""
+
+# Largest values, chosen so that products neither overflow nor lose what a score is made of.
 _SIZES = (2.0**-400, 2.0**400)
 
 

@@ -20,7 +20,8 @@ from kernels.types import Choreography, Float, Int
 Mask = NDArray[np.bool_]
 
 CONTINUES_S = 0.5 / 120
-"""A piece that starts within half a frame of where the one before ended, in the same clip, goes on without a seam."""
+"""A piece that starts within half a frame of where the one before ended, in the same clip, goes on without a seam. Half
+a value of a feature, by definition."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,15 +13,17 @@ from kernels.motion.features import FEATURE_RATE_HZ
 from kernels.types import Float, Int
 
 SNAP_REACH_S = 0.12
-"""A start is moved no further: more would be another match."""
+"""A start is moved no further: more would be another match. Chosen by hand."""
 
 OTHER_APART_S = 0.5
-"""Starts of one clip nearer to each other than this are the same piece: about one beat."""
+"""Starts of one clip nearer to each other than this are the same piece: about one beat. Tuned on 37 songs and 359 real
+clips: with 1 or 2 s fewer beats are met."""
 
 OTHER_LEAST_RATIO = 0.8
-"""Starts of a clip that score less than this share of its best are not offered."""
+"""Starts of a clip that score less than this share of its best are not offered. Chosen by hand."""
 
-_COARSE = 3  # frames between the starts tried first: half a bump's standard deviation
+_COARSE = 3
+"""Frames between the starts tried first. Chosen as half the standard deviation of a bump."""
 
 
 def motion_under(clip: NDArray[np.floating], n_frames: int, *, numerator: int, start: float) -> Float:

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 SCALE_DENOMINATOR = 50
 SCALE_NUMERATORS = tuple(range(45, 56))
+"""Scales 0.90, 0.92 to 1.10, as in [Yagi2009]."""
+
 SCALES = tuple(p / SCALE_DENOMINATOR for p in SCALE_NUMERATORS)
 
 

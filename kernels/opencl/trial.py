@@ -12,7 +12,10 @@ VERSION = "1"
 """Raised by hand when the trial asks for more: what was remembered of it counts no longer."""
 
 _N = 1024
-# Each answer is a few roundings off at most: mad and a division to 2.5 ulp are allowed, and the fused product has one.
+"""Values of a trial. Chosen by hand: some work-groups of any device."""
+
+# Chosen above the few roundings an answer may be off: by definition of OpenCL mad and a division of 2.5 ulp are
+# allowed, and the fused product has one.
 _RTOL = 32 * 2.0**-24
 
 Floats = NDArray[np.float32]

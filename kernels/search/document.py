@@ -22,7 +22,10 @@ from kernels.search.normalise import normalise
 from kernels.types import Float, Int
 
 N_FEATURE = 512
+"""As in [Ganbat2020]."""
+
 _WIDTHS = (16, 32, 64, 64)
+"""Of the four convolutions of [Ganbat2020], who do not give them. Chosen by hand."""
 _AXIS = "batch"
 
 

@@ -19,6 +19,7 @@ from kernels.search.normalise import channels, resample
 from kernels.types import Float
 
 N_DISCRIMINANT, N_PRINCIPAL = 128, 128
+"""Values of these parts of a vector. Chosen so that all parts are 512 together, as many as [Ganbat2020] have."""
 N_EMBEDDING = network.N_OUT + N_DISCRIMINANT + N_PRINCIPAL
 PARTS = ("network", "discriminant", "principal")
 _SIZES = dict(zip(PARTS, (network.N_OUT, N_DISCRIMINANT, N_PRINCIPAL), strict=True))

@@ -20,9 +20,17 @@ from kernels.types import Float, Int
 
 LABELLED = {"network": 0.10, "discriminant": 0.88, "principal": 0.02}
 UNLABELLED = {"network": 0.1, "principal": 0.9}
+"""Shares of the parts in a squared distance. Tuned on five style-disjoint and four take-disjoint splits of 325 clips:
+by take they hardly matter, by style the network's may not be large."""
+
 _VALIDATION_FOLDS = 6
+"""Of the takes one part is held out to find the number of steps. Chosen by hand."""
+
 _PATIENCE = 3
+"""Looks without a better one after which training ends. Chosen by hand."""
+
 _LEAST_OF_A_LABEL = 3
+"""Mirrored clips of a label from which the label they fall on is believed. Chosen by hand."""
 
 
 @dataclass(frozen=True)

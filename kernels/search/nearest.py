@@ -12,9 +12,18 @@ from kernels.search.aligned import COPY_M, Alignment
 from kernels.types import Float, Int
 
 MOST_QUERY_WINDOWS = 16
+"""Chosen for time, by hand."""
+
 UNLIKE_WEIGHT = 0.5
+"""How far a query moves away from what it is to be unlike, where 1 is all the way. Chosen by hand; [Rocchio1971] weighs
+less what was not liked, too."""
+
 _SPARE = 4
-_MOST_ALIGNED, _CANDIDATES = 400, 64
+"""Rows looked at, as a multiple of the clips wanted: a clip may have several. Chosen by hand."""
+
+_MOST_ALIGNED = 400
+_CANDIDATES = 64
+"""Clips that may be copies, and rows an approximate index names for them. Chosen for time, by hand."""
 
 Vectors = NDArray[np.float32]
 Candidates = Callable[[Vectors, int], Int]

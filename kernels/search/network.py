@@ -16,7 +16,12 @@ from kernels.search.normalise import N_CHANNELS
 WIDTHS = (64, 64, 128, 128)
 KERNELS = (5, 5, 3, 3)
 POOLED = (True, True, False, False)
+"""Channels and frames of the four convolutions, and after which of them every two frames become one. Chosen by hand;
+four as in [Ganbat2020]."""
+
 N_OUT = 256
+"""Values of the network's part of a vector. Chosen by hand, half of the vector."""
+
 Weights = Mapping[str, Any]
 
 

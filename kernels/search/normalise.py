@@ -15,18 +15,22 @@ from kernels.skeleton.canonical import JOINTS, LEG_LENGTH_M
 from kernels.types import Float
 
 RATE_HZ = 15.0
-"""Frames a second that motions are compared at."""
+"""Frames a second that motions are compared at. Chosen by hand."""
 
 _LEFT, _RIGHT = JOINTS.index("leftUpperLeg"), JOINTS.index("rightUpperLeg")
 _LEGS = [[JOINTS.index(f"{side}{part}") for part in ("UpperLeg", "LowerLeg", "Foot")] for side in ("left", "right")]
 _N = len(JOINTS)
 _LEAST_HIP_M = 0.02
+"""Length on the floor of the line from hip to hip below which it does not tell the facing. Chosen by hand."""
 
 N_CHANNELS = 6 * _N + 8
-"""Values a frame of :func:`channels`: joints, their velocities, and what the root does."""
+"""Values a frame of :func:`channels`, by definition: joints, their velocities, and what the root does."""
+
 VELOCITY = slice(3 * _N, 6 * _N)
 TRAVEL = slice(6 * _N, N_CHANNELS)
-# Divisors that bring channels of unlike units to about one: a third of a metre, a metre a second, a radian a second.
+"""Where these lie among them, by definition."""
+
+# Divisor that brings positions to about one, as velocities in metres and radians a second are. Chosen by hand.
 _POSITION_M = 0.3
 
 

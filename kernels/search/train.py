@@ -23,8 +23,14 @@ from kernels.search.normalise import channels
 from kernels.types import Float, Int
 
 _TEMPERATURE = 0.1
+"""As in [Khosla2020]."""
+
 _LONGEST_FRAMES = 64
+"""Of a batch's motions: 4.3 s. Chosen for time, by hand: about a window."""
+
 _MOST_OF_A_LABEL = 20
+"""Labels are drawn as the square root of their clips, of no more than so many. Chosen by hand, so that labels of few
+clips are learned too."""
 
 Trained = dict[str, NDArray[np.float32]]
 

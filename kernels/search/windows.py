@@ -7,7 +7,11 @@ import numpy as np
 from kernels.types import Float
 
 WINDOW_S = 4.0
+"""Chosen by hand."""
+
 LONGEST_WHOLE_S = 8.0
+"""Tuned on eight take-disjoint splits of real clips, with what is described of a clip
+(`kernels/search/describe.py`)."""
 
 
 def windows(duration_s: float, *, window_s: float = WINDOW_S, longest_whole_s: float = LONGEST_WHOLE_S) -> Float:

@@ -20,6 +20,8 @@ from kernels.skeleton import canonical, kinematics, topology
 from kernels.types import Clip, Float
 
 X, Y, Z = np.eye(3)
+"""Left, up and ahead, by convention."""
+
 SIDES = ("left", "right")
 # Bone of each canonical joint: the child its direction points to.
 BONE: dict[str, str] = {"neck": "head"} | {
@@ -28,6 +30,7 @@ BONE: dict[str, str] = {"neck": "head"} | {
 
 
 _NATURAL_RAD = np.radians(35.0)
+"""How far a back may curve and a neck lean at rest without tilting arms and head. Chosen by hand."""
 _HINGE: dict[tuple[str, ...], tuple[str, str, str]] = {
     topology.ARM: ("UpperArm", "LowerArm", "Hand"),
     topology.LEG: ("UpperLeg", "LowerLeg", "Foot"),

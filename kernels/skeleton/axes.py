@@ -16,7 +16,8 @@ import numpy as np
 from kernels.skeleton import canonical, kinematics, topology
 from kernels.types import Float, Skeleton
 
-# Metres one unit stands for, and the statures believed in it. The CMU subjects' files have inches over 0.45.
+# Metres one unit stands for, by definition, and the statures believed in it, chosen by hand: narrow where units are
+# near to each other. The CMU subjects' files have inches over 0.45, by convention of their makers.
 _UNITS: tuple[tuple[float, float, float], ...] = (
     (1.0, 0.9, 2.5),
     (0.01, 0.9, 2.5),
@@ -26,6 +27,7 @@ _UNITS: tuple[tuple[float, float, float], ...] = (
 )
 LANDMARKS = ("head", "leftFoot", "rightFoot", "leftToes", "rightToes", "leftHand", "rightHand")
 _UNITLESS_STATURE_M = 1.70
+"""Of a body in no unit. Chosen by hand, about the canonical one."""
 _STATURE_IN_LEGS = canonical.BODY_HEIGHT_M / canonical.LEG_LENGTH_M
 
 

@@ -34,6 +34,8 @@ _REST: tuple[tuple[str, str | None, tuple[float, float, float]], ...] = (
     ("rightFoot", "rightLowerLeg", (0.0, -0.41, 0.0)),
     ("rightToes", "rightFoot", (0.0, -0.06, 0.13)),
 )
+"""Joints of VRM 1.0, their parents, and their places in the parent's, metres. The proportions are chosen by hand."""
+
 
 JOINTS: tuple[str, ...] = tuple(name for name, _, _ in _REST)
 REQUIRED_JOINTS: tuple[str, ...] = tuple(
@@ -61,6 +63,7 @@ CANONICAL = Skeleton(
 
 BODY_HEIGHT_M = 1.72
 LEG_LENGTH_M = 0.82
+"""Of the canonical body, by definition: with a head above its joint, and from hip to ankle."""
 
 
 def mirror(root_xyz_m: Float, rotation_wxyz: Float) -> tuple[Float, Float]:

@@ -23,10 +23,10 @@ from kernels.skeleton.naming import JointMapping
 from kernels.types import Clip, Float, Skeleton
 
 SOLE_M = 0.02
-"""How far below the lower of ankle and toes a canonical foot's sole lies; of others in proportion."""
+"""How far below the lower of ankle and toes a canonical foot's sole lies, by definition; of others in proportion."""
 
 _REST = kinematics.rest_position(CANONICAL)
-_NECK_SHARE = 0.51 / 0.61  # where the neck begins on the way from hips to head
+_NECK_SHARE = 0.51 / 0.61  # where the neck begins on the way from hips to head, by definition of the canonical body
 
 
 @dataclass(frozen=True, eq=False)

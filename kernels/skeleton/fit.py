@@ -20,8 +20,10 @@ from kernels.skeleton.character import Character, leg_length_m
 from kernels.types import Clip, Float, Skeleton
 
 X, Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+"""Left and up, by convention."""
+
 _SETTLE_S = 0.15
-"""Time over which the hips sink to where both feet can be reached."""
+"""Time over which the hips sink to where both feet can be reached. Chosen by hand."""
 
 
 def fit(dance: Clip, figure: Skeleton) -> Clip:

@@ -18,7 +18,9 @@ from kernels.types import Float, Skeleton
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
 LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")
 _MOST_PAIRS = 24
-# Where the joints of the canonical spine lie on the way from hips to neck.
+"""Pairs of like branches that are looked at for arms and legs. Chosen for time, by hand."""
+
+# Where the joints of the canonical spine lie on the way from hips to neck, by definition of it.
 SPINE = {"spine": 0.10 / 0.51, "chest": 0.23 / 0.51, "upperChest": 0.36 / 0.51}
 
 

@@ -15,8 +15,13 @@ Float = NDArray[np.float64]
 Row = tuple[float, float, int, int, int, int]
 
 VELOCITY = {"o": 52, "x": 90, "X": 114}
+"""How hard a step of a pattern is struck, 1 to 127. Chosen by hand."""
+
 BASS_CHANNEL, CHORD_CHANNEL, MELODY_CHANNEL = 2, 3, 4
+"""Chosen by hand, of those that are not the drums'."""
+
 MAJOR, MINOR = (0, 2, 4, 5, 7, 9, 11), (0, 2, 3, 5, 7, 8, 10)
+"""Semitones of the scales, by definition."""
 
 BASS_STEPS = {
     "eighths": "x.x.",
@@ -47,10 +52,13 @@ CHORD_STEPS = {
     "arpeggio16": ("xxxx",),
 }
 INVENTION = ((0.95, 0.65, 0.3, 0.25, 0.1), (0.04, 0.15, 0.8, 0.12, 0.08))
-"""Chance of a kick and of a snare on the one, on other odd beats, on even beats, half-way between, and elsewhere."""
+"""Chance of a kick and of a snare on the one, on other odd beats, on even beats, half-way between, and elsewhere.
+Chosen by hand."""
+
 BASS_PROGRAMS = (32, 33, 34, 36, 38)
 CHORD_PROGRAMS = (0, 4, 16, 24, 25, 27, 29, 30, 30, 48, 50, 81, 88)
 MELODY_PROGRAMS = (40, 52, 54, 56, 65, 73, 80, 81, 0, 11, 26)
+"""Programs of General MIDI [MMA1991], chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)

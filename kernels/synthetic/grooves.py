@@ -23,6 +23,7 @@ LOW_TOM, MIDDLE_TOM, HIGH_TOM, TAMBOURINE, COWBELL, SHAKER, HIGH_CONGA, LOW_CONG
     64,
     75,
 )
+"""Keys of General MIDI percussion [MMA1991]."""
 
 
 @dataclass(frozen=True)
@@ -235,4 +236,4 @@ GROOVES = (
         weight=0.4,
     ),
 )  # fmt: skip
-"""Styles a made-up band plays."""
+"""Styles a made-up band plays. Chosen by hand."""

@@ -21,7 +21,9 @@ from kernels.synthetic.suit import BoneMotion, SyntheticBody
 from kernels.types import Clip, Float
 
 _T_POSE_S, _RAMP_S = 1.5, 1.0
-# Standard deviation of the sways about the joint's x, y and z in the T-pose, degrees.
+"""How long the dancer stands, and goes over into the dance. Chosen by hand."""
+
+# Standard deviation of the sways about the joint's x, y and z in the T-pose, degrees, chosen by hand.
 _SWAY_DEG: dict[str, tuple[float, float, float]] = {
     "spine": (4, 3, 4),
     "chest": (3, 3, 4),
@@ -45,7 +47,7 @@ _OF_SENSOR = {
     "shank": "LowerLeg",
     "foot": "Foot",
 }
-# From our world, Y up and facing +Z, to the suit's, z up and facing x.
+# From our world, Y up and facing +Z, to the suit's, z up and facing x, by convention of both.
 _TO_SUIT = rotation.from_matrix(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
 
 

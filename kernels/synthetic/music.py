@@ -15,13 +15,19 @@ Float = NDArray[np.float64]
 
 CLICKS = ("tick", "beep", "noise", "block", "kick")
 KICK, SNARE, HAT, CRASH = 36, 38, 42, 49
+"""Keys of General MIDI percussion [MMA1991]."""
+
 BARS = {
     4: ("x.......x.x.....", "....x.......x...", "x.x.x.x.x.x.x.x."),
     3: ("x...........", "....x...x...", "x.x.x.x.x.x."),
 }
-"""Kick, snare and hat of a bar by its number of beats, four steps a beat."""
+"""Kick, snare and hat of a bar by its number of beats, four steps a beat. Chosen by hand."""
+
 PROGRESSION = (0, 5, 3, 4)
+"""Degrees of the chords, from 0. Chosen by hand."""
+
 SCALE = (0, 2, 4, 5, 7, 9, 11)
+"""Semitones of a major scale, by definition."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,17 +19,17 @@ from kernels.synthetic.medley import sway
 from kernels.types import BeatGrid, Clip, Float, Int
 
 DRUM_KEYS: tuple[int, ...] = (36, 38, 42, 46, 49, 51, 45, 48, 39, 56, 54, 70)
-"""Percussion keys of the twelve symbols."""
+"""Percussion keys [MMA1991] of the twelve symbols. Chosen by hand."""
 
 HIT_AT = (0.0, 0.5, 0.75)
-"""Where in a motion its drums are struck."""
+"""Where in a motion its drums are struck, as a share of it. Chosen by hand."""
 
 REST = 0.08
-"""Share of a motion that the body rests for at either end."""
+"""Share of a motion that the body rests for at either end. Chosen by hand."""
 
 
 SWAY = 0.12
-"""Share of the slow sways of :func:`kernels.synthetic.medley.sway` that lies over the dance."""
+"""Share of the slow sways of :func:`kernels.synthetic.medley.sway` that lies over the dance. Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)

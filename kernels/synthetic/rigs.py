@@ -19,6 +19,7 @@ from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.types import Clip, Float, Skeleton
 
 _X, _Y, _Z = np.eye(3)
+"""Left, up and ahead, by convention."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,10 +21,16 @@ from kernels.calibration.records import PARENT, SENSORS, Recording
 from kernels.types import Float
 
 N_DOCUMENT_FRAMES = 6907
-FRAME_RATE_HZ = 120.0
-NEUTRAL_S, RAMP_S = 2.0, 1.5
+"""Frames of the recording of [Kitsunai2007]."""
 
-# Proximal joint in the parent's frame, metres, and the far end of segments without a further joint.
+FRAME_RATE_HZ = 120.0
+"""Chosen by hand: they last a minute."""
+
+NEUTRAL_S, RAMP_S = 2.0, 1.5
+"""How long the T-pose is held, and going over into the movement takes. Chosen by hand."""
+
+# Proximal joint in the parent's frame, and the far end of segments without a further joint: an adult of 1.75 m, chosen
+# by hand.
 _OFFSET_MM: dict[str, tuple[float, float, float]] = {
     "pelvis": (0, 0, 0),
     "thorax": (-20, 0, 120),
@@ -37,6 +43,7 @@ _OFFSET_MM: dict[str, tuple[float, float, float]] = {
     "shank": (0, 0, -430),
     "foot": (0, 0, -420),
 }
+# Where sensors are strapped, in the segment's frame, chosen by hand.
 _MOUNT_MM: dict[str, tuple[float, float, float]] = {
     "pelvis": (-90, 0, 30),
     "thorax": (-70, 0, 200),
@@ -49,7 +56,7 @@ _MOUNT_MM: dict[str, tuple[float, float, float]] = {
     "shank": (45, 20, -180),
     "foot": (90, 10, -30),
 }
-# Standard deviation of the angles about the bone's x, y and z, degrees, and their usual pace in Hz.
+# Standard deviation of the angles about the bone's x, y and z, degrees. Chosen by hand.
 _RANGE_DEG: dict[str, tuple[float, float, float]] = {
     "thorax": (12, 14, 16),
     "head": (15, 20, 26),
@@ -61,6 +68,7 @@ _RANGE_DEG: dict[str, tuple[float, float, float]] = {
     "shank": (1.6, 33, 3.3),
     "foot": (6.5, 15, 6),
 }
+# Soft tissue over that of other segments, chosen by hand: much flesh, and nearly none.
 _WOBBLE: dict[str, float] = {"thigh": 1.5, "upper_arm": 1.2, "head": 0.2}
 
 
@@ -153,6 +161,7 @@ class Disturbance:
 
 
 CLEAN = Disturbance(0.0, 0.0, 0.0, 0.0, 0.0)
+"""None, by definition."""
 
 
 def part(sensor: str) -> str:

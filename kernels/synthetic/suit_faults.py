@@ -134,4 +134,5 @@ FAULTS: dict[str, Fault] = {
     "outliers": Fault(_wild, "warning", "l_forearm", "outliers"),
     "hemisphere": Fault(_mirrored, "warning", "l_hand", "frame 500"),
 }
-"""Every fault that arrays can show; a joint that does not move is made by ``range_of_motion(frozen=...)``."""
+"""Every fault that arrays can show; a joint that does not move is made by ``range_of_motion(frozen=...)``. Sizes are
+chosen by hand."""
