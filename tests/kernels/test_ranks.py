@@ -25,3 +25,8 @@ def test_order_alone_counts():
     assert rank_correlation(up, -up) == pytest.approx(-1)
     assert rank_correlation(up, np.ones(6)) == 0
     assert rank_correlation(up[:2], up[:2]) == 0
+
+
+def test_three_are_enough():
+    assert rank_correlation(np.array([1.0, 2, 3]), np.array([1.0, 3, 2])) == pytest.approx(0.5)
+    assert rank_correlation(np.zeros(0), np.zeros(0)) == 0

@@ -171,3 +171,38 @@ def test_heading_of_upright_and_bent_bodies():
     np.testing.assert_allclose(rotation.heading_rad(bent), angles, atol=1e-9)
     upside = rotation.mul(upright, rotation.from_axis_angle(X, np.pi / 2))
     np.testing.assert_allclose(rotation.heading_rad(upside), angles, atol=1e-9)
+
+
+def test_continuous_leaves_a_first_half_turn_as_it_is():
+    half = np.array([[0.0, 1.0, 0, 0], [-0.1, -0.99, 0, 0]])
+    np.testing.assert_array_equal(rotation.continuous(half), [half[0], -half[1]])
+
+
+def test_continuous_leaves_what_is_square_to_the_one_before():
+    square = np.array([[1.0, 0, 0, 0], [0.0, -1.0, 0, 0], [0.0, 0, 0, 1.0]])
+    np.testing.assert_array_equal(rotation.continuous(square), square)
+
+
+def test_forward_decides_the_heading_until_it_points_within_thirty_degrees_of_the_vertical():
+    lean = rotation.from_axis_angle(Z, 0.3)  # the left axis now leaves the horizontal: the two would differ
+    for bend, by_forward in ((np.radians(59), True), (np.radians(61), False)):
+        q = rotation.mul(rotation.from_axis_angle(X, bend), lean)
+        forward, left = rotation.apply(q, Z), rotation.apply(q, X)
+        expected = np.arctan2(forward[0], forward[2]) if by_forward else np.arctan2(-left[2], left[0])
+        assert rotation.heading_rad(q) == pytest.approx(float(expected), abs=1e-12)
+
+
+@pytest.mark.parametrize("bad", [np.zeros(3), np.array([np.nan, 0, 1.0]), np.array([np.inf, 0, 1.0])])
+def test_between_refuses_either_vector(bad):
+    for u, v in ((bad, X), (X, bad), (np.stack([X, bad]), np.stack([Y, Y]))):
+        with pytest.raises(ValueError, match="non-zero length"):
+            rotation.between(u, v)
+
+
+def test_between_turns_half_about_a_square_axis_where_it_is_opposite_and_only_there():
+    u = np.array([X, X, [0.89, np.sqrt(1 - 0.89**2), 0]])
+    v = np.array([-X, Y, [-0.89, -np.sqrt(1 - 0.89**2), 0]])
+    q = rotation.between(u, v)
+    np.testing.assert_allclose(rotation.apply(q, u), v, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(q, axis=-1), 1)
+    np.testing.assert_allclose(q[1], rotation.from_axis_angle(Z, np.pi / 2), atol=1e-12)

@@ -79,6 +79,8 @@ def beats(**changes):
         ({"time_s": np.array([0.0, 0.5, np.inf])}, "finite"),
         ({"bar_number": np.ones(2, int)}, "bar_number"),
         ({"confidence": np.full(3, 1.5)}, "0 to 1"),
+        ({"confidence": np.array([0.5, -0.1, 0.5])}, "0 to 1"),
+        ({"time_s": np.array([0.0, np.nan, 1.0])}, "finite"),
     ],
 )
 def test_beat_grids_that_are_none(changes, what):
@@ -100,12 +102,28 @@ def graph(**changes):
         ({"next_node": np.array([1, 3, -1])}, "next_node: want -1 <= node < 3"),
         ({"target": np.array([2, -1])}, "target: want 0 <= node < 3"),
         ({"weight": np.array([0.1, -0.1])}, "weight"),
+        ({"weight": np.array([0.1, np.inf])}, "weight"),
+        ({"next_node": np.array([1, 2, -2])}, "next_node: want -1 <= node < 3"),
+        ({"source": np.array([0, 3])}, "source: want 0 <= node < 3"),
+        ({"accent": np.array([0.0, 1.0, 1.5])}, "accent: want \\(3,\\) from 0 to 1"),
+        ({"accent": np.array([0.0, 1.0, -0.5])}, "accent: want \\(3,\\) from 0 to 1"),
+        ({"accent": np.zeros(2)}, "accent: want \\(3,\\)"),
+        ({"peak_jerk": np.array([0.0, 1.0, -1.0])}, "peak_jerk: want \\(3,\\) finite, >= 0"),
+        ({"usual_jerk": np.array([0.0, 1.0, np.inf])}, "usual_jerk"),
+        ({"speed": np.zeros(4)}, "speed"),
     ],
 )
 def test_graphs_that_are_none(changes, what):
     assert len(graph().source) == 2
     with pytest.raises(ValueError, match=what):
         graph(**changes)
+
+
+def test_graphs_may_end_at_their_bounds():
+    none = graph(source=np.zeros(0, int), target=np.zeros(0, int), weight=np.zeros(0))
+    assert len(none.source) == 0
+    bounds = graph(accent=np.array([0.0, 1.0, 0.5]), speed=np.zeros(3), peak_jerk=np.zeros(3), weight=np.zeros(2))
+    assert (bounds.accent == [0, 1, 0.5]).all()
 
 
 def steps(**changes):
@@ -125,8 +143,15 @@ def test_warp_is_song_over_clip():
         ({"blend_s": np.zeros(1)}, "blend_s"),
         ({"clip_end_s": np.array([3.0, 5.0])}, "end > start"),
         ({"song_start_s": np.array([0.0, 1.5])}, "where the one before ended"),
+        ({"song_end_s": np.array([1.0, 1.0])}, "end > start"),
+        ({"clip_end_s": np.array([1.0, 6.0])}, "end > start"),
     ],
 )
 def test_choreographies_that_are_none(changes, what):
     with pytest.raises(ValueError, match=what):
         steps(**changes)
+
+
+def test_a_dance_of_no_steps_is_one():
+    nothing = {name: np.zeros(0) for name in ("song_start_s", "song_end_s", "clip_start_s", "clip_end_s", "blend_s")}
+    assert len(Choreography((), **nothing, has_seam=np.zeros(0, bool)).warp_ratio) == 0
