@@ -79,3 +79,10 @@ def test_signs_are_carried_over_what_is_not_good():
     is_good[4:6] = False
     got = aligned(flipped, is_good)
     assert (np.sum(got[1:] * got[:-1], axis=-1) > 0).all()
+
+
+def test_what_is_not_good_turns_no_sign_of_those_after_it():
+    angle = np.radians([0.0, 120.0, 60.0])
+    turned = np.stack([np.cos(angle), np.sin(angle), 0 * angle, 0 * angle], axis=1)[:, None]
+    got = aligned(turned, np.array([[True], [False], [True]]))
+    np.testing.assert_array_equal(got, turned * np.array([1.0, -1.0, 1.0])[:, None, None])

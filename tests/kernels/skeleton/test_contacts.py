@@ -144,6 +144,133 @@ def test_a_rolling_foot_does_not_slide():
     assert contacts.foot_slide(ankle, toes, planted, frame_rate_hz=30) == 0.0
 
 
+@pytest.mark.parametrize(("ankle_m", "toes_m"), [(0.02, 0.01), (0.01, 0.02)])
+def test_of_ankle_and_toes_the_one_that_moves_less_slides(ankle_m, toes_m):
+    ankle, toes = (size * np.arange(31.0)[:, None, None] * np.array([[[1.0, 0, 0]] * 2]) for size in (ankle_m, toes_m))
+    both = contacts.FootContacts(np.ones((31, 2), bool), np.ones((31, 2), bool), 0.0, 0.0, 0.0)
+    assert contacts.foot_slide(ankle, toes, both, frame_rate_hz=30) == pytest.approx(0.3)
+
+
+def test_a_point_that_is_not_in_contact_does_not_slide():
+    ankle, toes = np.zeros((31, 2, 3)), np.zeros((31, 2, 3))
+    ankle[..., 0] = 0.01 * np.arange(31)[:, None]
+    toes[..., 0] = 0.001 * np.arange(31)[:, None]
+    heels = contacts.FootContacts(np.ones((31, 2), bool), np.zeros((31, 2), bool), 0.0, 0.0, 0.0)
+    assert contacts.foot_slide(ankle, toes, heels, frame_rate_hz=30) == pytest.approx(0.3)
+
+
+def test_steps_into_and_out_of_a_contact_are_no_slide():
+    ankle = np.zeros((30, 2, 3))
+    ankle[10:, :, 0] += 1.0
+    ankle[20:, :, 0] += 1.0
+    stands = np.zeros((30, 2), bool)
+    stands[10:20] = True
+    planted = contacts.FootContacts(stands, stands, 0.0, 0.0, 0.0)
+    assert contacts.foot_slide(ankle, ankle, planted, frame_rate_hz=30) == 0.0
+
+
+EACH_FRAME = contacts.Thresholds(window_s=0.0)
+
+
+def standing(is_low, frame_rate_hz):
+    """Contacts of a foot that is on the floor in some frames and high up in the others, each frame by itself."""
+    foot = np.zeros((len(is_low), 2, 3))
+    foot[~np.array(is_low, bool), :, 1] = 0.5
+    found = contacts.find_contacts(
+        foot, foot, frame_rate_hz=frame_rate_hz, planted_height_m=(0.0, 0.0), thresholds=EACH_FRAME
+    )
+    return found.ankle[:, 0].tolist()
+
+
+def test_gaps_of_up_to_50_ms_are_closed_and_longer_ones_are_not():
+    assert all(standing([1] * 20 + [0] * 6 + [1] * 20, 120))
+    longer = [1] * 20 + [0] * 7 + [1] * 20
+    assert standing(longer, 120) == [bool(low) for low in longer]
+
+
+def test_a_gap_at_an_end_of_the_clip_is_none():
+    for low in ([0] * 3 + [1] * 20, [1] * 20 + [0] * 3):
+        assert standing(low, 120) == [bool(v) for v in low]
+
+
+def test_contacts_of_80_ms_are_kept_and_shorter_ones_dropped():
+    kept = [0] * 20 + [1] * 12 + [0] * 20
+    assert standing(kept, 150) == [bool(low) for low in kept]
+    assert not any(standing([0] * 20 + [1] * 11 + [0] * 20, 150))
+
+
+def test_a_clip_shorter_than_a_contact_keeps_its_contact():
+    assert standing([1, 1], 120) == [True, True]
+
+
+def test_one_frame_is_judged_by_its_height():
+    assert standing([1], 30) == [True]
+    assert standing([0], 30) == [False]
+
+
+@pytest.mark.parametrize(("height_m", "stands"), [(0.02, False), (0.06, True), (0.10, True), (0.14, False)])
+def test_a_foot_stands_no_further_below_its_planted_height_than_above_it(height_m, stands):
+    foot = np.zeros((30, 2, 3))
+    foot[..., 1] = height_m
+    found = contacts.find_contacts(foot, foot, frame_rate_hz=30, planted_height_m=(0.08, 0.08)).foot
+    assert found.all() == found.any() == stands
+
+
+def test_a_stretch_that_is_never_near_enough_is_no_contact():
+    foot = np.zeros((60, 2, 3))
+    foot[..., 1] = 0.04  # within the loose limit throughout
+    assert not contacts.find_contacts(foot, foot, frame_rate_hz=60, planted_height_m=(0.0, 0.0)).foot.any()
+    foot[30, :, 1] = 0.0
+    foot[29:32, :, 1] = 0.02
+    assert contacts.find_contacts(foot, foot, frame_rate_hz=60, planted_height_m=(0.0, 0.0)).foot.all()
+
+
+def test_a_short_contact_between_two_swings_is_seen():
+    """Frames at its ends are slow on one side only."""
+    foot = np.zeros((60, 2, 3))
+    foot[:25, :, 0] = -np.arange(25, 0, -1.0)[:, None] * 0.2
+    foot[35:, :, 0] = np.arange(1, 26.0)[:, None] * 0.2
+    found = contacts.find_contacts(foot, foot, frame_rate_hz=60, planted_height_m=(0.0, 0.0)).foot[:, 0]
+    assert found[26:34].all()
+    assert not found[:23].any()
+    assert not found[37:].any()
+
+
+def heights(height_m, speed_m_per_s=0.0, *, frame_rate_hz=30):
+    """Planted heights of feet at given heights, which move on at a given speed."""
+    foot = np.zeros((len(height_m), 2, 3))
+    foot[..., 1] = np.array(height_m)[:, None]
+    foot[..., 0] = np.cumsum(np.broadcast_to(speed_m_per_s, len(height_m)))[:, None] / frame_rate_hz
+    return contacts.planted_heights(foot, foot, frame_rate_hz=frame_rate_hz)
+
+
+def test_where_nothing_is_slow_the_lowest_heights_count():
+    assert heights([0.4] * 60 + [0.5] * 40, 2.0) == pytest.approx((0.4, 0.4))
+
+
+def test_a_foot_that_hardly_ever_rests_is_never_slow():
+    # 3 frames of 100 at rest, high up: fewer than a twentieth
+    speed = np.full(100, 2.0)
+    speed[51:53] = 0.0
+    height = np.full(100, 0.1)
+    height[49:54] = 1.0
+    assert heights(height, speed) == pytest.approx((0.1, 0.1))
+    speed[45:60] = 0.0
+    height[40:65] = 1.0
+    assert heights(height, speed) == pytest.approx((1.0, 1.0))
+
+
+def test_the_lowest_height_held_for_half_as_long_as_the_longest_counts():
+    assert heights([0.02] * 40 + [0.5] * 60) == pytest.approx((0.02, 0.02))
+    assert heights([0.02] * 20 + [0.5] * 80) == pytest.approx((0.5, 0.5))
+
+
+def test_the_floor_is_the_lower_of_planted_ankles_and_toes():
+    foot = np.zeros((30, 2, 3))
+    for planted in ((0.08, 0.02), (0.02, 0.08)):
+        assert contacts.find_contacts(foot, foot, frame_rate_hz=30, planted_height_m=planted).floor_m == 0.02
+
+
 def test_height_is_of_no_account_for_slide():
     ankle = np.zeros((30, 2, 3))
     ankle[..., 1] = np.linspace(0, 0.1, 30)[:, None]
