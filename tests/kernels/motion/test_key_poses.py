@@ -109,6 +109,7 @@ def test_a_short_motion_is_joined_across_the_weaker_braking():
 def test_the_shortest_motion_goes_first_and_the_outermost_ends_stay():
     inf = np.inf
     np.testing.assert_array_equal(_longer(np.array([0, 10, 100]), np.array([inf, 9.0, 1.0]), 30), [0, 100])
+    np.testing.assert_array_equal(_longer(np.array([0, 10, 100]), np.array([1.0, 9.0, 1.0]), 30), [0, 100])
     np.testing.assert_array_equal(_longer(np.array([0, 90, 100]), np.array([inf, 9.0, 1.0]), 30), [0, 100])
     # 20 to 25 goes by its weaker end; what is left of it is long enough
     edge, depth = np.array([0, 20, 25, 60]), np.array([inf, 2.0, 3.0, 1.0])
@@ -189,7 +190,9 @@ def test_how_high_the_hips_are_counts():
 def test_short_clips_have_no_speed():
     one = np.tile(rotation.IDENTITY, (1, len(JOINTS), 1))
     assert (angular_speed(one, 30.0) == 0).all()
-    assert (angular_speed(np.repeat(one, 2, axis=0), 30.0) == 0).all()
+    two = np.concatenate([one, np.tile(rotation.from_heading(1.0), (1, len(JOINTS), 1))])
+    assert len(angular_speed(two, 30.0)) == 5
+    assert (angular_speed(two, 30.0) == 0).all()
 
 
 def test_where_the_dancer_is_and_faces_does_not_count():
