@@ -281,7 +281,10 @@ def _filled(parts: dict[str, pa.Table]) -> list[pa.Table]:
 
 
 def _stamps(made_from: dict[str, str], parts: dict[str, pa.Table]) -> dict[str, ClipStamp]:
-    return {clip: ClipStamp(made_from[clip], content_version(part)) for clip, part in parts.items()}
+    """Stamp the clips whose reading is known; what the disk refused is read again."""
+    return {
+        clip: ClipStamp(made_from[clip], content_version(part)) for clip, part in parts.items() if clip in made_from
+    }
 
 
 def _listed(lines: list[str], longest: int = 50) -> str:
