@@ -1,14 +1,19 @@
 """Which dance is sought first: from where, and within which bounds."""
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
 
-from assets.dancing.by_graph import catalogue, path_costs, search
+from assets.dancing.asked import SOFT_WISH, Direction
+from assets.dancing.by_graph import by_graph, catalogue, path_costs, search
 from assets.dancing.refusal import RefusalError
-from kernels.types import MotionGraph
+from assets.reading.songs import PlayedSong
+from kernels.types import BeatGrid, MotionGraph
 from schemas.keys import mirrored
-from schemas.settings import PathSettings
+from schemas.pins import parse_pin
+from schemas.settings import PathSettings, Settings
 
 COSTS = path_costs(PathSettings())
 
@@ -66,3 +71,51 @@ def test_what_may_not_be_changed_is_neither_joined_nor_mirrored():
         (source, target) for source in (1, 5) for target in (0, 4)
     }
     assert not catalogue(graph, names, clips, ["CC-BY-4.0"]).is_allowed[[2, 3, 6, 7]].any()
+
+
+def danced(*wishes, intensity=None, weight=1.0, is_soft=True):
+    """Six beats of a song to the one clip there is, labelled step."""
+    graph = replace(one_clip(*[0.5] * 6), speed=np.array([1.0, 5.0, 2.0, 4.0, 3.0, 6.0, 7.0]))
+    clips = pl.DataFrame([{"clip_id": "a", "label": "step", "style": "", "licence": ""}])
+    time_s = np.arange(7) * 0.5
+    song = PlayedSong(time_s, BeatGrid(time_s, np.zeros(7, int), np.zeros(7, int), np.ones(7)), 3.0, intensity)
+    settings = Settings(path=PathSettings(intensity_weight=weight))
+    asked = Direction(tuple(parse_pin(text) for text in wishes), is_soft=is_soft)
+    return by_graph(catalogue(graph, ("a",), clips, ()), song, settings, asked)
+
+
+def test_what_a_dance_costs_is_the_sum_of_its_columns_each_counted_once():
+    found = danced("1-2.4=spin", intensity=np.array([1.0, 2.0, 3.0, 3.0, 2.0, 1.0]))
+    costs = found.metadata["costs"]
+    assert costs["intensity"] > 0
+    assert costs["wish"] == pytest.approx(3 * SOFT_WISH)
+    assert sum(costs.values()) == pytest.approx(found.metadata["cost"])
+    assert found.costs["wish_cost"].sum() == pytest.approx(3 * SOFT_WISH)
+    assert found.costs["intensity_cost"].sum() == pytest.approx(costs["intensity"])
+
+
+def test_movement_unlike_the_music_in_strength_is_no_wish():
+    found = danced(intensity=np.arange(6.0))
+    assert found.metadata["costs"]["intensity"] > 0
+    assert found.metadata["costs"]["wish"] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("how", [{"intensity": None}, {"intensity": np.arange(6.0), "weight": 0.0}])
+def test_where_strength_is_not_known_or_has_no_weight_it_costs_nothing(how):
+    assert danced(**how).metadata["costs"]["intensity"] == 0
+
+
+def test_a_soft_wish_that_cannot_be_kept_costs_and_a_hard_one_is_refused():
+    found = danced("1-2=spin")
+    assert [fact["is_kept"] for fact in found.metadata["pins"]] == [False]
+    with pytest.raises(RefusalError) as refused:
+        danced("1-2=spin", is_soft=False)
+    assert refused.value.conflict == ["1-2=spin"]
+    assert refused.value.ways_out
+
+
+def test_a_pin_that_is_kept_costs_nothing_and_names_its_steps():
+    found = danced("1-2=step", is_soft=False)
+    assert found.metadata["costs"]["wish"] == 0
+    assert [fact["is_kept"] for fact in found.metadata["pins"]] == [True]
+    assert found.pin_ids == [None, None, "1-2=step", "1-2=step", None, None]

@@ -265,6 +265,28 @@ def test_the_lowest_height_held_for_half_as_long_as_the_longest_counts():
     assert heights([0.02] * 20 + [0.5] * 80) == pytest.approx((0.5, 0.5))
 
 
+def test_a_planted_height_is_the_median_of_its_cluster():
+    held = np.repeat([0.02, 0.03, 0.04, 0.5], [30, 30, 30, 10])
+    ankle, _ = heights(held, frame_rate_hz=240)
+    assert ankle == pytest.approx(0.03)
+
+
+def test_the_lower_foot_of_each_frame_counts():
+    foot = np.zeros((90, 2, 3))
+    foot[:, 0, 1], foot[:, 1, 1] = 0.3, 0.1
+    assert contacts.planted_heights(foot, foot, frame_rate_hz=30) == pytest.approx((0.1, 0.1))
+
+
+def test_heights_are_means_over_half_the_window():
+    foot = np.zeros((61, 2, 3))
+    foot[..., 1] = 0.04 * (np.arange(61) % 2)[:, None]  # a tremor up to beyond the tight limit
+    slow = contacts.Thresholds(
+        tight_speed_m_per_s=9, loose_speed_m_per_s=9, tight_height_m=0.03, loose_height_m=0.03, widest_gap_s=0.0
+    )
+    found = contacts.find_contacts(foot, foot, frame_rate_hz=120, planted_height_m=(0.0, 0.0), thresholds=slow)
+    assert found.foot[5:-5].all()
+
+
 def test_the_floor_is_the_lower_of_planted_ankles_and_toes():
     foot = np.zeros((30, 2, 3))
     for planted in ((0.08, 0.02), (0.02, 0.08)):
