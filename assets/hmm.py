@@ -28,7 +28,8 @@ _EVERY = dg.AssetIn(partition_mapping=EVERY)
 METHOD = "hmm"
 
 MOST_CLUSTERED = 20_000
-"""Motions that basic motions are made from where no performance says which: taken evenly from all."""
+"""Motions that basic motions are made from where no performance says which: taken evenly from all. Chosen for time, by
+hand."""
 
 
 @table_asset(

@@ -113,7 +113,10 @@ def listen(song: SongFile, studio: Studio, settings: Settings) -> SongAnalysis:
 
 
 PREVIEW_RATE_HZ = 44100
+"""By convention that of compact discs."""
+
 LOUDNESS_RATE_HZ = 20.0
+"""Levels a second that are stored. Chosen by hand, to look at."""
 
 
 def _as_briefed(analysis: BeatAnalysis, brief: BeatsBrief, studio: Studio, song: SongFile) -> BeatAnalysis:
@@ -207,6 +210,7 @@ def _undanceable(heard: SongAnalysis) -> str:
 
 
 SILENCE_DB = -60.0
+"""A song whose loudest level is lower is silent. Chosen by hand."""
 
 
 def _row(song: SongFile, heard: SongAnalysis | None, reason: str) -> dict[str, object]:

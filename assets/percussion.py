@@ -17,6 +17,7 @@ from kernels.music.preview import render_preview
 from schemas.music import MELODY, PERCUSSION
 
 PREVIEW_RATE_HZ = 44100
+"""By convention that of compact discs."""
 
 
 @table_assets(

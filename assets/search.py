@@ -30,6 +30,7 @@ from schemas.search import LABEL_PROPOSAL, MOTION_EMBEDDING, MOTION_ENCODER, MOT
 from schemas.settings import SearchSettings
 
 _MOST_WINDOWS_A_CLIP = 4
+"""Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
+"""Exit statuses, by convention: 0 is well."""
 TROUBLE = Console(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 _answered: list[bool] = []
 """Whether standard output has had its one object."""

@@ -25,9 +25,9 @@ REFERENCE = "reference"
 """What the NumPy twins are called, in settings and in reports."""
 
 TRIAL_S = 120
-"""How long a driver may take to build a kernel of thirty lines before it counts as hung."""
+"""How long a driver may take to build a kernel of thirty lines before it counts as hung. Chosen by hand."""
 FORGET_S = 24 * 3600.0
-"""After this long a device that failed is tried again: its disk may have been full."""
+"""After this long a device that failed is tried again: its disk may have been full. Chosen by hand: a day."""
 
 Made = TypeVar("Made")
 Answer = TypeVar("Answer")

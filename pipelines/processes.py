@@ -11,8 +11,10 @@ import psutil
 from assets.formats.file_names import WINDOWS
 
 SAME_S = 2.0
-"""Two times of start no further apart are of one process: no system gives a number away again that soon."""
-# On Windows only a process that leads a group of its own can be asked to end; elsewhere 0 asks for nothing special.
+"""Two times of start no further apart are of one process: no system gives a number away again that soon. Chosen by
+hand."""
+# On Windows only a process that leads a group of its own can be asked to end; elsewhere 0, by definition, asks for
+# nothing special.
 GROUP: int = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name))
 """Signals besides Ctrl-C that ask a server to end: SIGBREAK is Ctrl-Break, which Windows sends for a closed window."""

@@ -1,4 +1,4 @@
-"""Every number says where it is from: constants of kernels and of dancing bear the word of their origin.
+"""Every number says where it is from: constants bear the word of their origin.
 
 Conventions
 -----------
@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).parents[1]
-FOLDERS = ("kernels", "assets/dancing")
+FOLDERS = ("kernels", "assets", "pipelines")
 TRAINED = "pulse_weights.py"  # weights of a network: its file says as a whole what they were trained on
 SOURCES = sorted(p for folder in FOLDERS for p in (REPOSITORY / folder).rglob("*.py") if p.name != TRAINED)
 

@@ -22,10 +22,19 @@ from assets.formats.errors import FormatError
 
 LONGEST_S = 1800.0
 MOST_VALUES = 2**28
+"""Seconds of a song, and its samples over all channels: 1 GiB of float32. Chosen by hand."""
+
 SLOWEST_HZ, FASTEST_HZ = 4000, 768_000
+"""Chosen by hand: half of what telephones have, and four times the fastest in use."""
+
 BLOCK_FRAMES = 1 << 18
+"""Decoded at a time. Chosen for memory, by hand."""
+
 UNSTATED = (0, 0xFFFFFFFF)
+"""Sizes that a RIFF header has, by convention, when its writer did not know them."""
+
 LARGEST_OGG_PAGE = 65_307
+"""Bytes, by definition: a header of 27, 255 lengths, and 255 pieces of 255."""
 
 SUFFIXES = {
     "WAV": {".wav", ".wave"},
@@ -46,6 +55,7 @@ STRANGERS = (
     (0, b"PK\x03\x04", "a ZIP archive"),
     (0, b"\x89PNG", "a PNG picture"),
 )
+"""First bytes of files that are no audio odori reads, and where they stand: by definition of those formats."""
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,11 @@ MARK = ".tmp-"
 """How the name of a file begins that is not finished: hidden, and never what anybody else writes."""
 
 
-# What Windows says of a file that another program holds open: access denied, sharing violation, mapped.
+# What Windows says, by definition, of a file that another program holds open: access denied, sharing violation, mapped.
 _HELD = (5, 32, 1224)
+
 _PATIENCE_S = 2.0
+"""How long such a file is waited for. Chosen by hand."""
 
 
 def is_held(error: OSError) -> bool:

@@ -20,7 +20,8 @@ from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.kinematics import rest_position
 from kernels.types import Float, Int, Skeleton
 
-# Joint, without its side: the joint its part reaches to, half widths in metres at both ends, depth over width.
+# Joint, without its side: the joint its part reaches to, half widths in metres at both ends, depth over width. All
+# chosen by hand, to look like a mannequin.
 _LIMBS: dict[str, tuple[str, float, float, float]] = {
     "hips": ("spine", 0.160, 0.125, 0.70),
     "spine": ("chest", 0.125, 0.135, 0.70),
@@ -33,11 +34,15 @@ _LIMBS: dict[str, tuple[str, float, float, float]] = {
     "UpperLeg": ("LowerLeg", 0.082, 0.058, 1.0),
     "LowerLeg": ("Foot", 0.058, 0.040, 1.0),
 }
-_PLAIN_RATIO = 0.12  # half width over length of a limb without a name
-_PLAIN_M = (0.008, 0.060)  # and its bounds
+_PLAIN_RATIO = 0.12  # half width over length of a limb without a name, chosen by hand
+_PLAIN_M = (0.008, 0.060)  # and its bounds, chosen by hand
+
 _SOLE_M = 0.02
+"""Of the canonical foot below its toes, by definition."""
+
 _SECTIONS = 14
 _ARC = 4
+"""Corners of a limb's cross-section, and rings of a rounded end. Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)

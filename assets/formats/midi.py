@@ -21,14 +21,19 @@ from kernels.music.notes import Notes, sorted_notes
 from kernels.types import BeatGrid
 
 DEFAULT_TEMPO_US = 500_000
-"""Microseconds a quarter note where a file has no tempo: 120 a minute."""
+"""Microseconds a quarter note where a file has no tempo: 120 a minute, by definition of Standard MIDI Files."""
 
 TICKS_A_QUARTER = 480
+"""Of files that are written, by convention of sequencers."""
+
 LARGEST_BYTES = 64 * 2**20
 LONGEST_S = 3600.0
 SMALLEST_TEMPO_US = 10_000
+"""Bytes and seconds of a file, and microseconds a quarter: 6000 a minute. Chosen by hand, beyond any song."""
+
 DATA_BYTES = {0x80: 2, 0x90: 2, 0xA0: 2, 0xB0: 2, 0xC0: 1, 0xD0: 1, 0xE0: 2}
 SYSTEM_BYTES = {0xF1: 1, 0xF2: 2, 0xF3: 1, 0xF6: 0, 0xF8: 0, 0xF9: 0, 0xFA: 0, 0xFB: 0, 0xFC: 0, 0xFE: 0}
+"""Data bytes that follow a message's first, by definition of MIDI."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from kernels.calibration.records import Recording
 
 SUFFIXES = (".parquet", ".csv")
 _FIRST_BYTES = 1 << 14
+"""Of a CSV, among which its first line is looked for. Chosen by hand."""
 
 
 def is_recording(path: Path | str) -> bool:

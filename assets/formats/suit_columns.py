@@ -22,7 +22,9 @@ from assets.formats.errors import FormatError, check_size
 from kernels.types import Float
 
 MAX_BYTES = 1 << 30
-# Two hours of 17 sensors at 240 Hz; a Parquet file of a few bytes can claim far more.
+"""Chosen by hand: hours of a recording."""
+
+# Two hours of 17 sensors at 240 Hz, chosen by hand; a Parquet file of a few bytes can claim far more.
 MAX_ROWS = 30_000_000
 _MAGIC = {
     b"\x1f\x8b": "a file packed by gzip (unpack it)",

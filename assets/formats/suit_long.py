@@ -15,9 +15,12 @@ from kernels.calibration.records import Recording
 from kernels.types import Float, Int
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "inch": 0.0254}
+"""By definition."""
+
 _FRAME = ("frame", "frame_index", "frame_number", "frameindex", "frame_id")
 _SENSOR = ("sensor", "sensor_name", "sensor_id", "segment", "segment_name", "station")
 _VALID = ("is_valid", "valid", "isvalid", "ok")
+# Seconds of each column's unit, by definition.
 SECONDS = {"time_s": 1.0, "time": 1.0, "timestamp": 1.0, "timestamp_s": 1.0, "t": 1.0, "t_s": 1.0}
 SECONDS |= {"time_ms": 1e-3, "timestamp_ms": 1e-3, "time_us": 1e-6, "timestamp_us": 1e-6, "time_ns": 1e-9}
 _QUATERNION = ("q{}", "q_{}", "quat_{}", "rot_{}", "rotation_{}", "quaternion_{}")

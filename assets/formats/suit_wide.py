@@ -28,7 +28,7 @@ _PLACED = (
     re.compile(r"(?P<station>.+?)_(?:loc|pos|position|p)_?(?P<axis>[xyz])" + _UNIT),
     re.compile(r"(?:loc|pos|position)_?(?P<axis>[xyz])_(?P<station>.+?)" + _UNIT),
 )
-# A body's largest distance between two sensors, in each unit; inches end where centimetres begin.
+# A body's largest distance between two sensors, in each unit, chosen by hand; inches end where centimetres begin.
 _BODY = (("m", 0.5, 3.0), ("in", 20.0, 95.0), ("cm", 95.0, 320.0), ("mm", 500.0, 3200.0))
 
 

@@ -31,8 +31,10 @@ from schemas import usd as contract
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 _FILE = re.compile(r"(?P<file>.+?\.usd[acz]?)(?::(?P<prim>/.*))?", re.IGNORECASE)
 SHORTEST_M, TALLEST_M = 0.2, 10.0
-"""Bodies that are danced on, from lowest joint to head: others are in another unit than their file says."""
+"""Bodies that are danced on, from lowest joint to head: others are in another unit than their file says. Chosen by
+hand."""
 _UNEVEN = 0.01
+"""How unlike a matrix's three scales may be. Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from assets.formats.usd_cast import character_folder
 from schemas import usd as contract
 
 _ZIP_HEADER_BYTES = 30
+"""Of a local file header, by definition of ZIP."""
 
 
 def write_package(path: str | Path, stage: str | Path) -> None:

@@ -14,6 +14,7 @@ from assets.tables.calibration import to_curves
 
 _CONFIDENCE = {"high": "#3c8c50", "medium": "#c8a01e", "low": WARM, "axis-unobserved": "#8c3c96", "none": INK}
 _MOST_PICTURES, _MOST_WARNINGS = 6, 60
+"""Chosen by hand, so that a page can be looked through."""
 
 
 def session(rows: pa.Table, doubtful: Sequence[str]) -> str:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 INK, SOFT, WARM, COOL = "#222222", "#999999", "#c8501e", "#1e64c8"
 LONGEST_LIST = 60
+"""Rows. Chosen by hand, so that a page can be looked through."""
 
 
 def markdown(headers: Sequence[str], rows: Sequence[Sequence[object]], *, longest: int = LONGEST_LIST) -> str:

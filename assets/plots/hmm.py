@@ -16,7 +16,10 @@ from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Float, Int
 
 _MOST_SHOWN = 64
+"""Basic motions drawn. Chosen by hand."""
+
 _INCHES_A_METRE, _WIDEST = 0.6, 13.0
+"""Scale of figures, and inches of a picture. Chosen by hand."""
 
 
 def drum_roll(hits: Hits) -> str:

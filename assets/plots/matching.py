@@ -18,6 +18,7 @@ from kernels.music.segments import Segments
 from kernels.types import Float
 
 _MOST_CLIPS = 6
+"""Drawn apart. Chosen by hand."""
 
 
 def session_features(features: pa.Table) -> str:

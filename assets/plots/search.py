@@ -16,6 +16,7 @@ from kernels.types import Float
 _MOST_ON_MAP = 1500
 _MOST_NAMED = 20
 _MOST_CONFUSED = 40
+"""Windows on the map, labels with a name there, and labels in a table of confusions. Chosen by hand, to be read."""
 
 
 def places(centre: NDArray[np.float32]) -> Float:

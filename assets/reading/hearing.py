@@ -15,7 +15,8 @@ SYMBOLS = (N_KEYS, len(CONTOUR))
 """Symbols of the two streams."""
 
 AHEAD_S = 0.06
-"""A motion is taken to hear what sounds from so shortly before it starts: drummers and dancers are not exact."""
+"""A motion is taken to hear what sounds from so shortly before it starts: drummers and dancers are not exact. Chosen by
+hand."""
 
 
 @dataclass(frozen=True, eq=False)

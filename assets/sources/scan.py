@@ -26,6 +26,8 @@ MIDI_SUFFIXES = (".mid", ".midi")
 # Said beside sources, not sources themselves.
 DOCUMENT_SUFFIXES = (".txt", ".md", ".pdf", ".json", ".toml", ".csv", ".beats", ".html", ".rtf", ".copyright", "")
 LARGEST_SESSION = 256
+"""Clips of a folder from which it is parted (decision 0003). Chosen by hand."""
+
 _MOTION = "a BVH file (.bvh) or a suit recording (.parquet, .csv)"
 
 

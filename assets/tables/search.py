@@ -181,3 +181,4 @@ def from_proposals(
 
 
 _CLEAR_VOTE = 0.6
+"""Share of the nearest clips' votes: three of five. Chosen by hand."""

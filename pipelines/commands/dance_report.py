@@ -90,7 +90,7 @@ def _difference(studio: StudioFolder, song: str, best: str, steps: pl.DataFrame)
 
 
 NEAR_S = 0.1
-"""Moments of a clip no further apart count as the same."""
+"""Moments of a clip no further apart count as the same. Chosen by hand."""
 
 
 def _moments(frames: pl.DataFrame) -> list[tuple[str, bool, int]]:

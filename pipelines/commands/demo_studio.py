@@ -19,14 +19,18 @@ from pipelines.studio.files import StudioError, write_beside
 
 SONG = "drum_machine"
 TEMPO_BPM = 116.0
+"""Of the demo's song. Chosen by hand."""
+
 _MARK = ".made-by-odori-demo"
 _SETTINGS = "# A made-up studio. Every key has a default; see 'docs/settings.md'.\n\n[dance]\nframe_rate_hz = 30\n"
-# A third dancer wears a suit and dances without a break.
+# A third dancer wears a suit and dances without a break; the seed is chosen by hand.
 _SUIT, _SUIT_SEED = "tsubaki", 11
 _MEDLEY = ("step", "twist", "kick", "wave", "rock", "spin")
-# A fourth dances to a drum track by rules that the model of the dancer can be compared with.
+# A fourth dances to a drum track by rules that the model of the dancer can be compared with. Number of motions and seed
+# are chosen by hand.
 PERFORMER, PERFORMANCE, N_MOTIONS, _RULES_SEED = "sumire", "hidden_rules", 200, 4
-# Beat intervals of the takes, and where each dancer faces: near the song's own beat, and one far from it.
+# Beat intervals of the takes, and where each dancer faces: near the song's own beat, and one far from it. Chosen by
+# hand.
 _TAKES = ((0.50, 0.0, 1.0), (0.54, 0.8, 0.8), (0.62, -1.2, 1.1))
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
+"""Exit statuses, by convention: 0 is well."""
 
 
 @dataclass(frozen=True)

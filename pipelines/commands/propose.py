@@ -22,6 +22,7 @@ from pipelines.studio.files import LakeError, StudioError
 from pipelines.studio.folder import StudioFolder, existing
 
 LONGEST_TABLE = 12
+"""Rows of candidates. Chosen by hand, to fit on a screen."""
 
 
 def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> Outcome:

@@ -26,7 +26,7 @@ from pipelines.commands.search_report import draw, hit_facts, report
 from pipelines.studio.files import StudioError
 
 PINNED_BY_LIKENESS = 5
-"""Clips most like one that a pin by likeness admits beside it."""
+"""Clips most like one that a pin by likeness admits beside it. Chosen by hand."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from schemas.motion import CANONICAL_POSE
 from schemas.music import SONG
 
 LONGEST_LIST = 40
+"""Lines. Chosen by hand, to fit on a screen."""
 
 
 def status(root: Path, *, devices: bool = False) -> Outcome:

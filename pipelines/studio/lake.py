@@ -106,16 +106,18 @@ class Lake:
         return beside.sweep(self.root)
 
 
+MOST_ROW_GROUPS = 4096
+"""Clips of a file up to which each has a row group of its own, so that one can be read alone. Chosen by hand: the
+footer grows with them."""
+
+
 def _write_parquet(table: pa.Table, file: IO[bytes]) -> None:
     is_framewise = TABLES[table.schema.metadata[b"table"].decode()].key == ("clip_id", "frame_index")
     parts = list(pack.by_clip(table).values()) if is_framewise and table.num_rows else [table]
-    if len(parts) > LONGEST_ROW_GROUPS:
+    if len(parts) > MOST_ROW_GROUPS:
         parts = [table]
     with pq.ParquetWriter(
         file, table.schema, compression="zstd", use_dictionary=["clip_id"] if is_framewise else True
     ) as out:
         for part in parts:
             out.write_table(part, row_group_size=max(part.num_rows, 1))
-
-
-LONGEST_ROW_GROUPS = 4096
