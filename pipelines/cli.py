@@ -28,13 +28,20 @@ app = typer.Typer(
 )
 DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
 """Exit statuses, by convention: 0 is well."""
+
+
+def _examples(*lines: str) -> str:
+    """Write examples one a line; the sign in front keeps the parser from running them together."""
+    return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
+
+
 TROUBLE = Console(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 _answered: list[bool] = []
 """Whether standard output has had its one object."""
 
 StudioOption = Annotated[
     Path | None,
-    typer.Option("--studio", help="The studio folder; else $ODORI_STUDIO, else ./studio.", show_default=False),
+    typer.Option("--studio", help="The studio folder. Left out: $ODORI_STUDIO, else ./studio.", show_default=False),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of the report.")]
 
@@ -54,15 +61,12 @@ def odori(
     """Take options that belong to no command."""
 
 
-@app.command()
+@app.command(epilog=_examples("odori demo"))
 def demo(
     studio: Annotated[Path, typer.Option("--studio", help="Folder for the made-up studio.")] = Path("demo"),
     as_json: JsonOption = False,
 ) -> None:
-    """Make up a studio, run the whole pipeline and dance its song: no input needed.
-
-    Example: odori demo
-    """
+    """Make up a studio and dance its song; needs no input."""
     from pipelines.commands import demo_studio
 
     with _Trouble(as_json):
@@ -71,15 +75,15 @@ def demo(
     _dance(studio, [demo_studio.SONG], "graph", None, None, as_json)
 
 
-@app.command()
+@app.command(epilog=_examples("odori build", "odori build --studio /shows/nagoya --dances"))
 def build(
     studio: StudioOption = None,
-    dances: Annotated[bool, typer.Option("--dances", help="Also dance every song again whose dance is stale.")] = False,
+    dances: Annotated[bool, typer.Option("--dances", help="Also make stale dances again.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Bring everything up to date: only what changed is computed.
+    """Bring a studio's tables up to date.
 
-    Examples: odori build · odori build --studio /shows/nagoya --dances
+    Only what changed is computed again.
     """
     from pipelines.commands.build import build_studio
 
@@ -88,7 +92,22 @@ def build(
         _finish(result, as_json)
 
 
-@app.command()
+@app.command(
+    epilog=_examples(
+        "odori dance waltz.mp3",
+        "odori dance all",
+        "odori dance waltz --method matching",
+        "odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY",
+        "odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk",
+        "odori dance waltz --propose 42",
+        "odori dance waltz --pin 12=spin --propose bar:9-10",
+        "odori dance waltz --alternatives 3",
+        "odori dance waltz --character hero.usdz",
+        "odori dance waltz --character ayame-step_01",
+        "odori dance waltz --fps 60 --out /show/waltz.usdz",
+        "odori dance groove.mid --method hmm --temperature 0.5 --seed 2",
+    )
+)
 def dance(
     songs: Annotated[
         list[str], typer.Argument(metavar="SONG...", help="Key or file name of a song; several, or 'all'.")
@@ -96,41 +115,62 @@ def dance(
     studio: StudioOption = None,
     method: Annotated[
         str | None,
-        typer.Option("--method", help="How the steps are chosen: graph, matching or hmm; else as the brief says."),
+        typer.Option(
+            "--method", help="How steps are chosen: graph, matching or hmm. Left out: the brief's method, else graph."
+        ),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option("--fps", help="Frames a second of the stage.", min=1.0, max=240.0)
+        float | None,
+        typer.Option("--fps", help="Frames a second of the stage. Left out: the settings'.", min=1.0, max=240.0),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="Also copy the stage here: a .usdz or .usdc file.")] = None,
     pin: Annotated[
         list[str] | None,
-        typer.Option("--pin", metavar="PLACE=WISH", help="What to dance when; kept, or refused with the reason."),
+        typer.Option(
+            "--pin",
+            metavar="PLACE=WISH",
+            help="What to dance when, as 42=spin. A pin is kept, or the dance is refused with the reason.",
+        ),
     ] = None,
     alternatives: Annotated[
-        int, typer.Option("--alternatives", help="How many different dances of each song to make.")
+        int,
+        typer.Option("--alternatives", help="How many dances of each song to make: the best, and others unlike it."),
     ] = 1,
     character: Annotated[
-        str, typer.Option("--character", metavar="CLIP|FILE.usd", help="Whose body dances; else as the brief says.")
+        str,
+        typer.Option(
+            "--character",
+            metavar="CLIP|FILE.usd",
+            help="Whose body dances: a clip's, or a rigged character's. Left out: the brief's, else odori's mannequin.",
+        ),
     ] = "",
     propose: Annotated[
         str | None,
-        typer.Option("--propose", metavar="PLACE", help="Only list what could be pinned there, with its cost."),
+        typer.Option(
+            "--propose",
+            metavar="PLACE",
+            help="Make no dance: list what could be pinned at this place, and at what cost.",
+        ),
     ] = None,
     temperature: Annotated[
         float | None,
-        typer.Option("--temperature", help="Of hmm: 0 the most probable dance, 1 one drawn as the dancer would."),
+        typer.Option(
+            "--temperature",
+            help="hmm only. 0: the most probable dance. 1: motions drawn at random by the model's probabilities.",
+        ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Another number, another draw.", min=0)] = 0,
+    seed: Annotated[
+        int,
+        typer.Option(
+            "--seed", help="hmm only. Number of the random draw: the same number gives the same dance.", min=0
+        ),
+    ] = 0,
     as_json: JsonOption = False,
 ) -> None:
     """Dance a song: a USD stage with the music in it.
 
-    Examples: odori dance waltz.mp3 · odori dance waltz --method matching · odori dance all ·
-    odori dance waltz --fps 60 --out /show/waltz.usdz · odori dance waltz --pin 42=spin --pin 12.5-16=clip:KEY ·
-    odori dance waltz --pin bar:9-12=style:salsa --pin start=not:walk --alternatives 3 ·
-    odori dance waltz --propose 42 · odori dance waltz --pin 12=spin --propose bar:9-10 ·
-    odori dance waltz --character hero.usdz · odori dance waltz --character ayame-step_01 ·
-    odori dance groove.mid --method hmm --temperature 0.5 --seed 2
+    A song's brief, songs/NAME.brief.toml, keeps method, pins, licences and character for every rebuild; options given
+    here come before it.
     """
     if propose is not None:
         _propose(studio, songs, propose, pin or (), as_json)
@@ -178,20 +218,24 @@ def _dance(
         _finish(result, as_json)
 
 
-@app.command()
+@app.command(
+    epilog=_examples(
+        "odori why waltz --at 12.34", "odori why 'waltz|graph_2'", "odori why dances/waltz/graph.usdz --at 12.34"
+    )
+)
 def why(
     danced: Annotated[
         str,
         typer.Argument(metavar="DANCE", help="A song, 'SONG|METHOD', or a stage: .usdz or .usdc.", show_default=False),
     ],
-    at: Annotated[float | None, typer.Option("--at", help="Second of the song; left out: the whole dance.")] = None,
+    at: Annotated[float | None, typer.Option("--at", help="Second of the song. Left out: the whole dance.")] = None,
     studio: StudioOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say where a moment of a dance comes from: clip, time, blend, pace, licence, and why it was chosen.
+    """Say where a moment of a dance comes from, and why.
 
-    Examples: odori why waltz --at 12.34 · odori why 'waltz|graph_2' · odori why dances/waltz/graph.usdz --at 12.34 (a
-    stage answers for itself and needs no studio)
+    It names clip, time, blend, warp and licence, and what the step costs. A stage carries its own lineage: asked about
+    one, the command needs no studio.
     """
     from pipelines.commands.why import explain_dance
 
@@ -199,14 +243,14 @@ def why(
         _finish(explain_dance(_folder(studio), danced, at_s=at), as_json)
 
 
-@app.command()
+@app.command(epilog=_examples("odori check dances/waltz/graph.usdz"))
 def check(
-    file: Annotated[Path, typer.Argument(metavar="FILE.usd[cz]", help="The stage to look at.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE.usd[cz]", help="The stage to validate.")],
     as_json: JsonOption = False,
 ) -> None:
-    """Validate a stage: USD's own validators, and our contract.
+    """Validate a stage.
 
-    Example: odori check dances/waltz/graph.usdz
+    USD's own validators are run, and what odori promises of its stages (docs/usd.md) is checked.
     """
     from pipelines.commands.check import check_stage
 
@@ -214,7 +258,14 @@ def check(
         _finish(check_stage(file), as_json)
 
 
-@app.command()
+@app.command(
+    epilog=_examples(
+        "odori search ayame-step",
+        "odori search ayame-step@2.5-4 -k 5 --style salsa",
+        "odori search take.bvh",
+        "odori search --like ayame-step --unlike kaede-kick --sheet hits.png",
+    )
+)
 def search(
     clip: Annotated[
         str | None,
@@ -233,17 +284,17 @@ def search(
     max_seconds: Annotated[
         float | None, typer.Option("--max-seconds", help="Only clips at most this long.", min=0.0)
     ] = None,
-    like: Annotated[list[str] | None, typer.Option("--like", help="More like this motion too.")] = None,
-    unlike: Annotated[list[str] | None, typer.Option("--unlike", help="Less like this motion.")] = None,
+    like: Annotated[
+        list[str] | None, typer.Option("--like", help="Move the search towards this clip; may be repeated.")
+    ] = None,
+    unlike: Annotated[
+        list[str] | None, typer.Option("--unlike", help="Move the search away from this clip; may be repeated.")
+    ] = None,
     sheet: Annotated[Path | None, typer.Option("--sheet", help="Draw query and hits as stick figures: a PNG.")] = None,
-    train: Annotated[bool, typer.Option("--train", help="Train the encoder anew on the clips there are now.")] = False,
+    train: Annotated[bool, typer.Option("--train", help="Train the encoder again, on the clips of today.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the clips most like a motion.
-
-    Examples: odori search ayame-step · odori search ayame-step@2.5-4 -k 5 --style salsa · odori search take.bvh ·
-    odori search --like ayame-step --unlike kaede-kick --sheet hits.png
-    """
+    """Find the clips most like a motion."""
     with _Trouble(as_json):
         from pipelines.commands import search as searching
 
@@ -263,24 +314,35 @@ def search(
         _finish(result, as_json)
 
 
-@app.command()
+@app.command(epilog=_examples("odori calibrate take.parquet", "odori calibrate take.csv --bvh take.bvh"))
 def calibrate(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="A suit recording: .parquet or .csv.")],
     bvh: Annotated[Path | None, typer.Option("--bvh", help="Also write the motion as BVH here.")] = None,
     poses: Annotated[
         Path | None,
-        typer.Option("--poses", help="Where to write joint centres, Parquet; else RECORDING.poses.parquet, here."),
+        typer.Option(
+            "--poses", help="Where to write joint centres as Parquet. Left out: RECORDING.poses.parquet in this folder."
+        ),
     ] = None,
-    method: Annotated[str | None, typer.Option("--method", help="gauss_newton or springs; else the setting.")] = None,
-    iterations: Annotated[int | None, typer.Option("--iterations", help="Steps of the method; 0: its usual.")] = None,
+    method: Annotated[
+        str | None, typer.Option("--method", help="gauss_newton or springs. Left out: the setting's.")
+    ] = None,
+    iterations: Annotated[
+        int | None, typer.Option("--iterations", help="Iterations of the method. 0: its usual number.")
+    ] = None,
     studio: Annotated[
-        Path | None, typer.Option("--studio", help="A studio whose odori.toml counts; needs none.", show_default=False)
+        Path | None,
+        typer.Option(
+            "--studio",
+            help="A studio whose odori.toml is used. Left out: $ODORI_STUDIO, else none.",
+            show_default=False,
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Calibrate a suit recording: bones, how sure they are, what to record again, and the motion. Needs no studio.
+    """Calibrate a suit recording to bones and poses.
 
-    Examples: odori calibrate take.parquet · odori calibrate take.csv --bvh take.bvh
+    The report says how sure each bone length is, and what to record again. No studio is needed.
     """
     with _Trouble(as_json):
         from pipelines.commands import calibrate as calibrating
@@ -296,33 +358,33 @@ def calibrate(
         _finish(result, as_json)
 
 
-@app.command()
+@app.command(epilog=_examples("odori status", "odori status --json", "odori status --devices"))
 def status(
     studio: StudioOption = None,
     devices: Annotated[
-        bool, typer.Option("--devices", help="Also try every OpenCL device anew, and say which is used and why.")
+        bool,
+        typer.Option(
+            "--devices", help="Also try every OpenCL device, and say which one computes and why; needs no studio."
+        ),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Say what is fresh, stale, failed or refused, and why.
-
-    Examples: odori status · odori status --json · odori status --devices (needs no studio)
-    """
+    """Say what is fresh, stale, failed or refused, and why."""
     from pipelines.commands.status import status as say_status
 
     with _Trouble(as_json):
         _finish(say_status(_folder(studio), devices=devices), as_json)
 
 
-@app.command()
+@app.command(epilog=_examples("odori ui", "odori ui --port 3001"))
 def ui(
     studio: StudioOption = None,
     port: Annotated[int, typer.Option("--port", help="Port of the web page.")] = 3000,
     host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = "127.0.0.1",
 ) -> None:
-    """Open Dagster's web UI on this studio, with the sensor and the nightly schedule running.
+    """Serve Dagster's web UI on this studio.
 
-    Example: odori ui --port 3001
+    The sensor for new files and the nightly rebuild run along.
     """
     from pipelines import web
 

@@ -169,12 +169,12 @@ def sentences(
         "nothing": f"what is {_called(those[0])} may not be danced: its licence is not among those of 'allow'"
         if nodes.wished(those[0]).any() and not those[0].pose
         else f"no clip with {parts.many} is {_called(those[0])}{_near(those[0], nodes)}",
-        "tempo": f"what it wishes has no {parts.many} near enough to the song's tempo there (warp 0.80 to 1.25)"
+        "tempo": f"all {parts.many} it admits are too fast or too slow for the song there (warp beyond 0.80 to 1.25)"
         if not those[0].pose
-        else "no clip shows a pose near enough to it at the song's tempo there (warp 0.80 to 1.25)",
+        else "no clip shows such a pose near enough to the song's tempo there (warp 0.80 to 1.25)",
         "start": f"no {parts.way} leads there in time, or from there to the end of the song",
-        "same_time": "each of them can be kept, but no clip is all of this at the same time",
-        "path": f"each of them can be kept, but no {parts.way} keeps them all"
+        "same_time": "each can be kept alone, but no clip is all of them at once",
+        "path": f"each can be kept alone, but no {parts.way} keeps them all"
         + _within([pins[i] for i in conflict.pin_index]),
     }[conflict.reason]
     fixed = [
@@ -183,8 +183,9 @@ def sentences(
     if fixed and conflict.reason in ("start", "path"):
         reason += f"; by its licence the clip of {' and '.join(fixed)} may not be changed and enters no blend"
     ways = [way_out(way, pins, wishes, song) for way in conflict.ways_out]
-    more = ["other pins conflict too: mend this conflict first"] if conflict.has_more else []
-    return [f"{names}: {reason}", *(f"would do: {way}" for way in ways), *more]
+    more = ["other pins conflict too; mend these first"] if conflict.has_more else []
+    leads = ["this would work", *["or"] * len(ways)]
+    return [f"{names}: {reason}", *(f"{lead}: {way}" for lead, way in zip(leads, ways, strict=False)), *more]
 
 
 def _within(pins: Sequence[Pin]) -> str:

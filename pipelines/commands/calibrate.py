@@ -180,7 +180,7 @@ def _report(recording: Path, found: Calibrated, seconds: dict[str, float], poses
 
 
 def _joint_lines(calibration: Calibration) -> list[str]:
-    lines = [f"  {'joint':<12} {'on':<12} {'bone, mm':>8}  {'residual, mm':>12}  confidence"]
+    lines = [f"  {'joint':<12} {'parent':<12} {'bone, mm':>8}  {'residual, mm':>12}  confidence"]
     for joint in calibration.joints:
         length_mm, residual_mm = 1000 * joint.length_m, 1000 * joint.residual_rms_m
         line = f"  {joint.joint:<12} {joint.parent:<12} {length_mm:8.1f}  {residual_mm:12.1f}  {joint.confidence}"

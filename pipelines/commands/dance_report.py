@@ -1,4 +1,4 @@
-"""What is told of finished dances: for a machine, for a person, and as a copy of the stage."""
+"""Reports of finished dances: facts for machines, lines for people, and copies of the stage."""
 
 import json
 import shutil
@@ -30,14 +30,14 @@ from schemas.pins import PinWish
 
 
 def dances_facts(made: list[dict[str, Any]], troubles: list[str], n_asked: int) -> dict[str, Any]:
-    """Tell a machine of one dance, or of several."""
+    """Put together what ``--json`` prints of one dance, or of several."""
     if n_asked == 1:
         return made[0] if made else {"error": "; ".join(dict.fromkeys(troubles))}
     return {"dances": made, "troubles": list(dict.fromkeys(troubles))}
 
 
 def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
-    """Gather what is told of one dance: its files, measures, costs, pins, licence, and how it differs from the best."""
+    """Gather the facts of one dance: its files, measures, costs, pins, licence, and how it differs from the best."""
     folder = studio.dances_of(song)
     report = json.loads((folder / f"{method}.json").read_bytes())
     steps = pl.DataFrame(studio.lake.table(CHOREOGRAPHY.name, f"{song}|{method}"))
@@ -100,7 +100,7 @@ def _moments(frames: pl.DataFrame) -> list[tuple[str, bool, int]]:
 
 
 def _pin_facts(studio: StudioFolder, song: str, method: str, steps: pl.DataFrame) -> list[dict[str, Any]]:
-    """Tell for each pin when it is danced, by which clips, and whether it is kept."""
+    """List for each pin when it is danced, by which clips, and whether it is kept."""
     wishes = direction_of(studio, f"{song}|{method}").wishes
     if not wishes:
         return []
@@ -145,7 +145,7 @@ class _Posed:
         self._nodes = pl.DataFrame(lake.table("motion_graph_node"))
 
     def facts(self, wish: PinWish) -> dict[str, Any]:
-        """Tell of one pin: the clip shown, when, how far from the pose, whether that is near enough."""
+        """List for one pin the clip shown, when, how far from the pose, and whether that is near enough."""
         moment_s = pose_pins.moment_of(wish, self._played)
         shown = pose_pins.shown_pose(wish, moment_s, self._lineage, self._dance, self._poses, self._nodes)
         return {"clips": [shown["shown_clip_id"]] if "shown_clip_id" in shown else [], **shown}
@@ -159,27 +159,29 @@ def _named(clip: Mapping[str, Any], *, is_image: bool) -> dict[str, str]:
 
 
 def report_of(facts: dict[str, Any]) -> str:
-    """Tell a person of one dance."""
+    """Write the report of one dance."""
     q = facts["quality"]
     lines = [
         f"{facts['song']}: {facts['usdz']}",
-        f"  {q['clip_count']:.0f} clips, {q['seam_count']:.0f} seams; beats at most {q['beat_lag_ms']:.1f} ms off; "
-        f"warp {q['warp_least_ratio']:.2f} to {q['warp_most_ratio']:.2f}",
-        f"  on the beat to an independent eye: F {q['beat_f_ratio']:.2f}, p {q['beat_p_probability']:.3f}",
+        f"  {q['clip_count']:.0f} clips, {q['seam_count']:.0f} seams; steps start at most {q['beat_lag_ms']:.1f} ms "
+        f"off their beat; warp {q['warp_least_ratio']:.2f} to {q['warp_most_ratio']:.2f} (song time over clip time)",
+        f"  beats: F {q['beat_f_ratio']:.2f} of 1 (beats of music and body within 70 ms of each other; by chance "
+        f"{q['beat_f_chance_ratio']:.2f}), p {q['beat_f_p_probability']:.3f} (how often shifted beats do as well)",
     ]
     costs = ", ".join(f"{name} {value:.1f}" for name, value in facts["costs"].items() if value >= 0.05)
     lines.append(f"  cost {facts['cost']:.1f}: {costs or 'nothing'}")
     if "same_ratio" in facts:
         lines.append(
-            f"  against the best dance: {facts['same_ratio']:.0%} of the time the same, {facts['shared_ratio']:.0%} of "
-            f"its motion shown there too, {len(facts['shared_clips'])} of {len(facts['clips'])} clips shared"
+            f"  compared with the best dance: {facts['same_ratio']:.0%} of the time both show the same moment, "
+            f"{facts['shared_ratio']:.0%} of its motion is in the best dance too, "
+            f"{len(facts['shared_clips'])} of {len(facts['clips'])} clips are shared"
         )
     if facts["character"]:
         body = facts["character"]
         lines.append(
-            f"  danced by {body.get('clip_id') or body['file']}, {body['scale_ratio']:.2f} of our legs: feet slide "
-            f"{body['added_foot_slide_cm_per_s']:+.1f} cm/s beyond ours, at most {body['penetration_cm']:.1f} cm "
-            "below the floor"
+            f"  danced by {body.get('clip_id') or body['file']}, legs {body['scale_ratio']:.2f} of the canonical "
+            f"skeleton's: feet slide {body['added_foot_slide_cm_per_s']:+.1f} cm/s more than there, at most "
+            f"{body['penetration_cm']:.1f} cm below the floor"
         )
     lines.append(f"  licence {facts['licence']['name']}: {facts['licence']['sentence']}")
     lines += [
@@ -187,20 +189,21 @@ def report_of(facts: dict[str, Any]) -> str:
         for p in facts["pins"]
     ]
     if facts["not_as_wanted"]:
-        lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (see the .json beside the stage)")
+        lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (limits: the .json beside the stage)")
     if "model" in facts:
         lines += hmm_report.report_lines(facts["model"])
     return "\n".join(lines)
 
 
 def _when(pin: Mapping[str, Any]) -> str:
-    """Say when a pin is danced; of a pose, which moment is shown and how far it is from what was wished."""
+    """Say when a pin is danced; of a pose, which moment is shown and how far it is from the pose pinned."""
     if "distance_m" not in pin:
         return f"from {pin['from_s']:.2f} to {pin['to_s']:.2f} s"
     turned = " mirrored" if pin["is_mirrored"] else ""
     apart_cm = 100 * pin["distance_m"]
     return (
-        f"at {pin['shown_time_s']:.2f} s{turned}, joints {apart_cm:.1f} cm from it in the mean, at {pin['at_s']:.2f} s"
+        f"at {pin['shown_time_s']:.2f} s{turned}, joints {apart_cm:.1f} cm from the pose on average, "
+        f"at {pin['at_s']:.2f} s of the song"
     )
 
 

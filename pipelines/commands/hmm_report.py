@@ -1,4 +1,4 @@
-"""What a person is told of a dance by the model of the dancer: what it was learned from, and what the music adds."""
+"""Report of a dance by the model of a dancer: what the model was learned from, and what the music adds."""
 
 from typing import Any
 
@@ -6,11 +6,11 @@ from assets.tables import hmm as hmm_tables
 from pipelines.studio.lake import Lake
 
 _NOBODY = (
-    "no clip{of} was danced to a song of this studio: motions follow each other as in the clips, drawn anew for every "
-    "seed, and the music gives no more than its beats; name the song in clips.csv (performed_to), or give both files "
-    "one name"
+    "no clip{of} was danced to a song of this studio, so the model has no music to learn from: motions follow each "
+    "other as in the clips, in another order for every --seed, and of the music only the beats count; to change that, "
+    "name the song in clips.csv (performed_to), or give both files one name"
 )
-_FEW = "the performances are too short to tell whether their music matters: nothing could be held out; add longer ones"
+_FEW = "the performances are too short to measure whether their music matters; add longer ones"
 
 
 def model_facts(lake: Lake, *, subject: str = "") -> dict[str, Any]:
@@ -34,8 +34,9 @@ def model_facts(lake: Lake, *, subject: str = "") -> dict[str, Any]:
         notes = [_FEW]
     elif not found.music_adds:
         notes = [
-            f"the music of the {n_performances} performances tells nothing of their motions that the motion before "
-            f"does not (gain {found.gain:.3f}, p {found.p:.3f}): the dance follows the dancer, not the drums"
+            f"the music of the {n_performances} performances does not help to predict the next motion (gain "
+            f"{found.gain:.3f} nats a motion, p {found.p:.3f}: how often shuffled music does as well): the dance "
+            "follows the dancer, not the drums"
         ]
     else:
         notes = []
@@ -54,24 +55,24 @@ def dance_notes(report: dict[str, Any]) -> list[str]:
     wanted, notes = report["wanted"], []
     if _failed(wanted, "warp_easy_ratio"):
         notes.append(
-            "motions as long as the song's beats ask for are few: they are danced beyond 0.90 to 1.10 of their pace; "
+            "few motions are as long as the song's beats need: some are danced beyond 0.90 to 1.10 of their pace; "
             "add clips danced near its tempo, or set beats.octave in its brief"
         )
     if _failed(wanted, "beat_p_probability") or _failed(wanted, "beat_f_p_probability"):
-        notes.append("too short, or moving too evenly, for its beats to be told from chance by an independent eye")
+        notes.append("the dance is too short, or moves too evenly, to tell its beats from chance")
     if _failed(wanted, "seam_jerk_ratio") and wanted["seam_jerk_ratio"]["value"] <= 1.5:
         notes.append(
-            "seams are within 1.5 of the clips' own jerk, but poses there are so alike that a plain cut is as smooth: "
-            "blends have nothing to better"
+            "seams are within 1.5 times the clips' own jerk, but poses there are so alike that a plain cut is as "
+            "smooth: a blend cannot improve on it"
         )
     if any(_failed(wanted, name) and wanted[name]["value"] > 1.5 for name in _ROUGH):
         notes.append(
-            "of the recordings that fit its beats some join only roughly: rough themselves, or calm beside a wilder "
-            "one; add clips danced near its tempo, or try wider blends (dance.blend_s = 0.55)"
+            "some of the recordings that fit its beats join only roughly: they are rough themselves, or calm beside a "
+            "wilder one; add clips danced near its tempo, or try wider blends (dance.blend_s = 0.55)"
         )
     if any(_failed(wanted, name) for name in ("added_foot_slide_cm_per_s", "knee_pop_ratio")):
         notes.append(
-            "recordings that fit its beats stand differently where they meet: feet or knees give way there; add "
+            "recordings that fit its beats stand differently where they meet, and feet or knees give way there; add "
             "clips danced near its tempo"
         )
     return notes
@@ -85,9 +86,12 @@ def _failed(wanted: dict[str, Any], name: str) -> bool:
 
 
 def report_lines(facts: dict[str, Any]) -> list[str]:
-    """Tell a person what the model was learned from, and what to know of it."""
+    """Write what the model was learned from, and what a director should know of it."""
     lines = [f"  {facts['basic_motions']} basic motions, learned from {facts['performances']} performances"]
     if facts["music_adds"]:
         gain, p = facts["music_gain_nats"], facts["music_p_probability"]
-        lines.append(f"  the music tells the motion: {gain:+.2f} a motion, p {p:.3f}")
+        lines.append(
+            f"  the music helps to predict the next motion: {gain:+.2f} nats a motion (gain in log probability), "
+            f"p {p:.3f} (how often shuffled music does as well)"
+        )
     return lines + [f"  note: {note}" for note in facts["notes"]]

@@ -1,4 +1,4 @@
-"""What could be pinned at a place of a song: read from the lake, told to a person and to a machine."""
+"""What could be pinned at a place of a song, and what it would cost: facts for machines, a report for people."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -64,24 +64,24 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
     said: dict[str, Any] = {"song": song, "place": place, "from_s": at.from_s, "to_s": at.to_s}
     facts = {**said, "pins": [wish.text for wish in asked.wishes], **found}
     if found["best_cost"] is None:
-        trouble = f"{song}: cannot be danced at all with what may be danced; 'odori dance' says why"
+        trouble = f"{song}: cannot be danced at all with the clips that 'allow' admits; 'odori dance' says why"
         return Outcome(NOTHING_DONE, {"error": trouble}, troubles=[trouble])
     return Outcome(DONE, facts, _report(facts))
 
 
 def _report(facts: Mapping[str, Any]) -> str:
-    """Tell a person: one table a kind, the cheapest first."""
+    """Write one table a kind, the cheapest first."""
     pins = f", with {', '.join(facts['pins'])}" if facts["pins"] else ""
     lines = [
         f"{facts['song']} from {facts['from_s']:.2f} to {facts['to_s']:.2f} s: what could be pinned there{pins}",
-        f"costs beyond the best dance's {facts['best_cost']:.2f}; a seam is about 1",
+        f"extra cost of the whole dance, beyond the best one's {facts['best_cost']:.2f}; a seam costs about 1",
     ]
     for kind in ("labels", "styles", "clips"):
         rows = facts[kind]
         lost = facts["out_of_reach"][kind]
         if not rows and not lost:
             continue
-        lines.append(f"{kind}: {len(rows)} within reach, {len(lost)} not")
+        lines.append(f"{kind}: {len(rows)} can be danced there, {len(lost)} cannot")
         lines += [f"  {_price(row):>9}  {row['pin']}{_also(row)}" for row in rows[:LONGEST_TABLE]]
         if len(rows) > LONGEST_TABLE:
             lines.append(f"             … and {len(rows) - LONGEST_TABLE} more, up to {_price(rows[-1])}: see --json")
@@ -99,7 +99,7 @@ def _also(row: Mapping[str, Any]) -> str:
     else:
         told += [text for text in (row["label"], row["style"]) if text]
     if row["steps_outside_warp_bounds"]:
-        told.append(f"{row['steps_outside_warp_bounds']} steps beyond the bounds of warp")
+        told.append(f"{row['steps_outside_warp_bounds']} steps outside the warp bounds")
     return f"  ({', '.join(told)})" if told else ""
 
 

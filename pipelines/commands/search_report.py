@@ -39,7 +39,7 @@ def report(facts: dict[str, Any]) -> str:
     hits = facts["hits"]
     if not hits:
         return "no clip is left after these filters"
-    lines = [f"like {facts['query'] or ', '.join(facts['like'])}:"]
+    lines = [f"most like {facts['query'] or ', '.join(facts['like'])} (distance 0 to 2, clip, stretch, label):"]
     width = max(len(hit["clip_id"]) for hit in hits)
     lines += [
         f"  {hit['distance']:.3f}  {hit['clip_id']:<{width}}  {hit['start_s']:.2f} to {hit['end_s']:.2f} s  "
@@ -53,7 +53,7 @@ def report(facts: dict[str, Any]) -> str:
 
 def _laid(hit: dict[str, Any]) -> str:
     apart_m = hit["copy_apart_m"]
-    return "" if apart_m is None else f", joints {100 * apart_m:.1f} cm off"
+    return "" if apart_m is None else f", a copy: joints {100 * apart_m:.1f} cm apart"
 
 
 def draw(sheet: Path, catalogue: SearchCatalogue, query: NamedMotion, found: Sequence[Hit]) -> None:

@@ -96,7 +96,7 @@ def _facts(clip: Mapping[str, Any], *, is_mirrored: bool = False) -> dict[str, A
 
 
 def _lines(facts: Mapping[str, Any]) -> list[str]:
-    """Tell the facts of a moment to a person."""
+    """Write the facts of a moment as lines."""
     step, blend = facts["step"], facts["blend"]
     return [
         f"{facts['dance']} at {facts['time_s']:.2f} s (frame {facts['frame_index']})",
@@ -109,7 +109,7 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
         f"{', mirrored' if blend['is_mirrored'] else ''}, {blend['path']}"
         if blend["clip_id"]
         else "  blend    none",
-        f"  pace     {facts['warp_ratio']:.3f} of the song's time to the clip's",
+        f"  warp     {facts['warp_ratio']:.3f} (song time over clip time)",
         f"  step     {step['step_index']}: song {step['song_start_s']:.2f} to {step['song_end_s']:.2f} s, "
         + ("after a seam" if step["has_seam"] else "going on in the clip" if step["step_index"] else "the first"),
         f"  why      {_reason(step)}",
@@ -119,7 +119,7 @@ def _lines(facts: Mapping[str, Any]) -> list[str]:
 def _reason(step: Mapping[str, Any]) -> str:
     costs = ", ".join(f"{name} {value:.2f}" for name, value in sorted(step["costs"].items(), key=lambda c: -c[1]))
     pin = f"pin {step['pin']}; " if step["pin"] else ""
-    return f"{pin}the cheapest way for the whole song; here it pays {costs or 'nothing'}"
+    return f"{pin}the cheapest path for the whole song; cost of this step: {costs or 'nothing'}"
 
 
 def _whole(told: Told) -> Outcome:
@@ -138,7 +138,7 @@ def _whole(told: Told) -> Outcome:
         "clips": [{"clip_id": clip, **_facts(row)} for clip, row in told.clips.items()],
     }
     lines = [f"{told.name}: {told.duration_s:.2f} s, {len(told.clips)} clips; {told.licence.get('sentence', '')}"]
-    lines.append("     song          clip seconds     pace  pays  clip")
+    lines.append("     song          clip seconds     warp  cost  clip")
     for run in _phrases(named):
         first, last = run[0], run[-1]
         cost = sum(sum(step["costs"].values()) for step in run)
@@ -188,7 +188,7 @@ def from_stage(path: Path) -> Told:
     animation = usd_lineage.animation_with_lineage(stage)
     if animation is None:
         raise StudioError(
-            f"{path}: want a stage that says where its frames come from, got none; dance the song again with this odori"
+            f"{path}: want a stage with the lineage of its frames, got none; dance the song again with this odori"
         )
     codes = np.arange(stage.GetStartTimeCode(), stage.GetEndTimeCode() + 1)
     provenance = usd_read.read_provenance(path)

@@ -242,7 +242,7 @@ def test_what_is_not_as_wanted_has_a_reason():
         return dance_notes({"wanted": {name: {"value": v, "is_passed": False} for name, v in failed.items()}})
 
     assert notes() == []
-    assert "nothing to better" in notes(seam_jerk_ratio=1.2)[0]
+    assert "cannot improve" in notes(seam_jerk_ratio=1.2)[0]
     assert "join only roughly" in notes(seam_jerk_ratio=1.7)[0]
     assert "join only roughly" in notes(seam_jerk_worst_ratio=2.3)[0]
     assert "stand differently" in notes(knee_pop_ratio=1.3)[0]

@@ -148,7 +148,7 @@ def test_a_start_pose_and_an_end_pose(studio, dance):
     assert [pin["shown_clip_id"] for pin in told] == ["kaede-rock", "kaede-rock", "ayame-step"]
     assert told[0]["at_s"] == 0.0
     assert told[2]["at_s"] == pytest.approx(13.5, abs=0.2)
-    assert "cm from it in the mean" in outcome.report
+    assert "cm from the pose on average" in outcome.report
     poses = {
         clip: pl.read_parquet(
             studio / "lake" / "canonical_pose" / f"{clip.partition('-')[0]}.parquet", glob=False
@@ -175,7 +175,7 @@ def test_poses_that_cannot_be_shown_are_refused_with_ways_out(dance):
     assert both.status == 2
     assert both.facts["conflict"] == ["start=kick", "start=pose:ayame-wave@2"]
     assert "start=kick in place of start=pose:ayame-wave@2" in both.facts["ways_out"]
-    assert "no clip is all of this at the same time" in both.facts["why"]
+    assert "no clip is all of them at once" in both.facts["why"]
 
 
 def test_poses_of_the_brief_hard_and_soft(studio, dance):

@@ -96,17 +96,17 @@ def test_reports(song, nodes):
     told = sentences(Conflict((0,), "nothing", (WayOut(0, 0, "spin"),)), pins, wishes, song, nodes)
     assert told == [
         "2=spni: no clip with beats is labelled 'spni'; there are spin",
-        "would do: 2=spin in place of 2=spni",
+        "this would work: 2=spin in place of 2=spni",
     ]
     assert way_out(WayOut(1, -2, ""), pins, wishes, song) == "2.00-3.00=walk, 2 beats earlier than 3-4=walk"
     fixed = replace(nodes, is_whole=nodes.wished(wishes[0]))
     told = sentences(Conflict((0,), "start", ()), pins, wishes, song, fixed)[0]
     assert told.endswith(f"by its licence the clip of {wishes[0].text} may not be changed and enters no blend")
     more = sentences(Conflict((0,), "tempo", (), has_more=True), pins, wishes, song, nodes)
-    assert more[-1] == "other pins conflict too: mend this conflict first"
+    assert more[-1] == "other pins conflict too; mend these first"
     told = sentences(Conflict((0, 1), "path", ()), pins, wishes, song, nodes)[0]
     assert told.endswith("keeps them all (1 beat between them)")
-    assert "at the same time" in sentences(Conflict((0, 1), "same_time", ()), pins, wishes, song, nodes)[0]
+    assert "at once" in sentences(Conflict((0, 1), "same_time", ()), pins, wishes, song, nodes)[0]
     forbidden = sentences(Conflict((1,), "nothing", ()), pins, wishes, song, nodes)[0]
     assert forbidden == "3-4=walk: what is labelled 'walk' may not be danced: its licence is not among those of 'allow'"
     assert kept(pins[1:], song, {6: "b", 7: "b"}) == [{"pin": "3-4=walk", "from_s": 3.0, "to_s": 4.0, "clips": ["b"]}]

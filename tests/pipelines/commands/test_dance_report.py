@@ -32,7 +32,7 @@ def test_alternatives_say_what_they_share(studio):
         assert facts["same_ratio"] < 0.5
         assert set(facts["shared_clips"]) <= set(facts["clips"])
         assert bool(facts["costs"]["diversity"]) == bool(facts["shared_clips"])
-    assert outcome.report.count("against the best dance") == 2
+    assert outcome.report.count("compared with the best dance") == 2
 
 
 def test_copies_go_where_nothing_is_lost(tmp_path):

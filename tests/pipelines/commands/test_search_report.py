@@ -14,14 +14,14 @@ def facts():
 
 def test_a_line_a_hit_and_where_the_query_is_laid_over_it_how_far_joints_are_off(facts):
     assert report(facts).splitlines() == [
-        "like day-step_0:",
-        "  0.013  day-step_10  0.50 to 2.00 s  step, shy, joints 0.4 cm off",
+        "most like day-step_0 (distance 0 to 2, clip, stretch, label):",
+        "  0.013  day-step_10  0.50 to 2.00 s  step, shy, a copy: joints 0.4 cm apart",
         "  0.250  day-step_1   0.50 to 2.00 s  step",
     ]
 
 
 def test_without_a_query_the_wishes_head_it(facts):
-    assert report(facts | {"query": "", "like": ["a", "b"]}).startswith("like a, b:")
+    assert report(facts | {"query": "", "like": ["a", "b"]}).startswith("most like a, b (")
 
 
 def test_no_hit_is_said(facts):

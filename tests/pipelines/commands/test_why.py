@@ -40,7 +40,7 @@ def test_a_report_for_a_person(built):
     assert f"beat|graph at {seam:.2f} s" in report
     assert "blend    " in report
     assert "licence  CC0-1.0" in report
-    assert "why      the cheapest way" in report
+    assert "why      the cheapest path" in report
 
 
 def test_the_whole_dance(built):
