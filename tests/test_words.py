@@ -60,3 +60,27 @@ def test_nothing_is_said_that_only_its_writers_understand(what):
         if NEVER[what].search(line)
     ]
     assert not lines
+
+
+def test_the_index_of_decisions_lists_them_all():
+    folder = REPOSITORY / "docs" / "decisions"
+    listed = re.findall(r"^\| \[\d{4}\]\((.+?)\)", (folder / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert listed == sorted(path.name for path in folder.glob("0*.md"))
+
+
+def test_the_glossary_is_in_order_and_says_each_word_once():
+    text = (REPOSITORY / "docs" / "glossary.md").read_text(encoding="utf-8")
+    words = [word.lower() for word in re.findall(r"^\*\*(.+?)\*\*", text, re.MULTILINE)]
+    assert len(words) > 40
+    assert words == sorted(set(words))
+    assert "glossary.md" in (REPOSITORY / "README.md").read_text(encoding="utf-8")
+
+
+def test_links_between_pages_lead_somewhere():
+    broken = [
+        f"{page.name}: {target}"
+        for page in PAGES
+        for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8"))
+        if "://" not in target and not (page.parent / target).exists()
+    ]
+    assert not broken
