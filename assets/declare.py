@@ -141,7 +141,7 @@ def _metadata(
 
 
 def column_schema(table: Table) -> dg.TableSchema:
-    """Tell a table's columns as Dagster's UI shows them.
+    """List a table's columns as Dagster's UI shows them.
 
     Parameters
     ----------

@@ -189,7 +189,7 @@ def _of_no_beat(settings: MotionGraphSettings) -> BeatFeatures:
 
 
 def _by_label(node: pa.Table) -> str:
-    """Tell what each label has in the graph: clips, beats, and how many of them a dance can use."""
+    """Count what each label has in the graph: clips, beats, and how many of them a dance can use."""
     counted = (
         pl.DataFrame(node.select(["label", "clip_id", "is_kept"]))
         .group_by("label")

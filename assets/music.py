@@ -148,7 +148,7 @@ def _within(analysis: BeatAnalysis, duration_s: float) -> BeatAnalysis:
 
 
 def _level_of(grid: BeatGrid) -> tuple[TempoCandidate, ...]:
-    """Make the only candidate of beats that were told, not found."""
+    """Make the only candidate of beats that a file names."""
     if len(grid.time_s) < 2:
         return ()
     return (TempoCandidate(1.0, 60 / float(np.median(np.diff(grid.time_s))), 1.0, True),)

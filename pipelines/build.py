@@ -46,7 +46,7 @@ class Batch:
         return [Batch(self.job, self.assets, (key,)) for key in self.keys]
 
     def without(self, given_up: Collection[tuple[str, str]]) -> list["Batch"]:
-        """Leave out the partitions of which something was given up: itself whole, or one by one what is left."""
+        """Batches of the partitions in which no asset was given up: this one if that is all, else one a partition."""
         left = [b for b in self.singles() if not any((asset, b.keys[0]) in given_up for asset in b.assets)]
         return [self] if len(left) == len(self.keys) else left
 

@@ -365,7 +365,7 @@ def _identity(device: Any) -> str:  # noqa: ANN401 - a cl.Device
 
 @lru_cache(maxsize=1)
 def _processor() -> str:
-    """Tell the processor apart from others: by what the kernel says of it, else by its family."""
+    """Name the processor, to tell it from others: by what the kernel says of it, else by its family."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").partition("\n\n")[0]
     except OSError:
@@ -388,7 +388,7 @@ def _why_slow(tried: Sequence[Tried]) -> str:
 
 
 def to_standard_error(line: str) -> None:
-    """Tell the person who waits one line.
+    """Write one line for the person who waits.
 
     Parameters
     ----------

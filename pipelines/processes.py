@@ -21,7 +21,7 @@ ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK
 
 
 def started(pid: int) -> str:
-    """Tell when a process was started, in seconds, as text; empty where there is none of that number.
+    """Find when a process was started, in seconds, as text; empty where there is none of that number.
 
     On Linux the seconds count from the start of the machine, so that setting its clock changes nothing; elsewhere,
     where the system itself keeps the time of start, they count from 1970.

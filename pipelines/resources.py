@@ -1,4 +1,4 @@
-"""Resources that are plain objects: what the graph remembers, progress that nobody watches."""
+"""Resources that are plain objects: the stored arrays of the motion graph, and progress that is not shown."""
 
 import zipfile
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from pipelines.studio.lake import Lake
 
 
 class NoProgress:
-    """Progress that nobody watches."""
+    """Progress that is not shown."""
 
     def begin(self, what: str, total: int) -> None:
         """Start counting."""

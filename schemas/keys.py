@@ -210,7 +210,7 @@ def base_method(method: str) -> str:
 
 
 def alternative_number(method: str) -> int:
-    """Tell which dance of its method: 1 for the best, 2 and on for alternatives.
+    """Find which dance of its method it is: 1 for the best, 2 and on for alternatives.
 
     Parameters
     ----------

@@ -25,8 +25,9 @@ from kernels.types import Choreography, Float
 from schemas.settings import Settings
 
 APART_S = 0.1
-"""How far apart moments of one clip are that pass for neighbours. Tuned on real clips: at 0.017 s only a clip itself
-connects, at 0.2 s over half of all pairs do, with feet that visibly slide."""
+"""Time between two moments of a clip that count as neighbours: pieces connect where they differ no more
+than those. Tuned on real clips: at 0.017 s only a clip itself connects, at 0.2 s over half of all pairs do, with feet
+that visibly slide."""
 
 MARGIN_COST = 0.5
 """Price of a blend half of which would lie past the clip's end. Chosen by hand."""

@@ -272,7 +272,7 @@ def shown_pose(
     poses: ClipPoses,
     beats: pl.DataFrame,
 ) -> dict[str, Any]:
-    """Tell what a finished dance shows at the moment of a wish for a pose.
+    """Find what a finished dance shows at the moment of a pin of a pose.
 
     Parameters
     ----------

@@ -66,12 +66,16 @@ def propose(
     Returns
     -------
     dict
-        ``best_cost``, and ``labels``, ``styles`` and ``clips``, the cheapest first: name, the pin to write,
-        ``extra_cost`` over the best dance with the pins that are asked for already, and how many clips it has there;
-        ``out_of_reach``, names by kind; ``unpriced_clips`` and the like where a stretch has more than
-        :data:`MOST_PROGRAMS` candidates. Costs are those of the dynamic program: exact, all but the price of showing
-        the same again over the whole song. With ``repeat = "structure"`` the parts that come again are those of the
-        best dance, all but the intervals of the place and those that are to show the same.
+        ``best_cost``: cost of the best dance with the pins asked for already. ``labels``, ``styles``, ``clips``: rows,
+        the cheapest first, of name, the pin to write, ``extra_cost`` over ``best_cost``, and how many clips it has
+        there. ``out_of_reach``: names by kind that no dance can show there. ``unpriced_labels``, ``unpriced_styles``,
+        ``unpriced_clips``: names beyond :data:`MOST_PROGRAMS`, where the place has more candidates.
+
+    Notes
+    -----
+    Costs are those of the dynamic program. They are exact but for repetition, which is counted as in the best dance.
+    With ``repeat = "structure"`` other places where the song repeats are taken from the best dance; the intervals of
+    the place, and those that must show the same, are free.
 
     Raises
     ------
@@ -109,7 +113,7 @@ def propose(
 
 
 def _of_clip(known: GraphCatalogue, place: Asked, node: int, best: int) -> Mapping[str, Any]:
-    """Tell of a clip what is seen of it where it is cheapest; a pin cannot name the pose of a mirror image."""
+    """Describe what is seen of a clip where it is cheapest; a pin cannot name the pose of a mirror image."""
     shown = node if best < 0 else best
     told = {"label": str(known.nodes.label[shown]), "style": str(known.nodes.style[shown])}
     if best < 0:

@@ -33,6 +33,6 @@ class RefusalError(ValueError):
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """What a machine is told: ``conflict``, ``why`` and ``ways_out``, each where it is known."""
+        """Facts for machines: ``conflict``, ``why`` and ``ways_out``, each where it is known."""
         told: dict[str, Any] = {"conflict": self.conflict, "why": self.why or None, "ways_out": self.ways_out}
         return {name: value for name, value in told.items() if value is not None}

@@ -143,7 +143,7 @@ def parse(data: bytes, path: str = "") -> Bvh:
 
 
 def frame_rate_hz(frame_time_text: str) -> float:
-    """Tell the frame rate that was meant from a frame time as written.
+    """Find the frame rate that was meant by a frame time as written.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ def file_name(key: str, *, windows: bool = WINDOWS) -> str:
 
 
 def key_of(name: str, *, windows: bool = WINDOWS) -> str:
-    """Tell the key of a file's name without its suffix: the inverse of :func:`file_name`.
+    """Read the key from a file's name without its suffix: the inverse of :func:`file_name`.
 
     Parameters
     ----------

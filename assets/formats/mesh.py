@@ -114,7 +114,7 @@ def _scale(skeleton: Skeleton) -> float:
 
 
 def _side(joint: str, rest_xyz_m: Float, scale: float) -> int:
-    """Tell the side by the name, else by the place at rest; an index into SIDES."""
+    """Find the side by the name, else by the place at rest; an index into SIDES."""
     name = joint.lower()
     if "left" in name or "right" in name:
         return 1 if "left" in name else 2

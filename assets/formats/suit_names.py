@@ -27,7 +27,7 @@ _NOISE = {"sensor", "imu", "marker", "segment", "seg", "receiver", "s"}
 
 
 def sensor_of(name: str) -> str | None:
-    """Name of ours for a sensor as a file calls it; None where it tells nothing.
+    """Name of ours for a sensor as a file calls it; None where it is not known.
 
     Case, punctuation and the place of the side do not matter: ``L.UpperArm``, ``left_upper_arm`` and ``upperarm_l``
     are one.

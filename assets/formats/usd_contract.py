@@ -362,7 +362,7 @@ def _warning(rule: str, prim_path: str, sentence: str) -> StageFinding:
 
 
 def _authored(stage: Usd.Stage, key: str) -> str:
-    """Tell what the stage says of itself, or that it says nothing."""
+    """Report what the stage says of itself, or that it says nothing."""
     return f"{stage.GetMetadata(key)}" if stage.HasAuthoredMetadata(key) else "nothing"
 
 
@@ -373,7 +373,7 @@ def _matrices(attribute: Usd.Attribute) -> Float:
 
 
 def _is_rigid(matrix: Float) -> bool:
-    """Tell whether each matrix turns and moves and does nothing else."""
+    """Whether each matrix turns and moves and does nothing else."""
     turn = matrix[:, :3, :3]
     square = turn @ np.swapaxes(turn, -1, -2)
     is_turn = np.allclose(square, np.eye(3), atol=1e-4) and (np.linalg.det(turn) > 0).all()
@@ -381,12 +381,12 @@ def _is_rigid(matrix: Float) -> bool:
 
 
 def _shape(value: NDArray[np.float64]) -> str:
-    """Tell how many values came."""
+    """Say how many values came."""
     return f"{len(value)} values" if value.ndim and len(value) else "none"
 
 
 def _span(times: NDArray[np.float64]) -> str:
-    """Tell the first and last of a row of time codes."""
+    """Say the first and last of a row of time codes."""
     return f"{times[0]:g} to {times[-1]:g} ({len(times)})" if len(times) else "none"
 
 

@@ -134,7 +134,7 @@ def to_model(table: pa.Table, *, melody_weight: float) -> Model:
 
 
 def from_music_evidence(performances: Sequence[Performance], found: Evidence, n_hits: Sequence[int]) -> pa.Table:
-    """Pack what music tells, one row a performance of which something could be held out."""
+    """Pack how much music helps to predict motions, one row a performance of which something could be held out."""
     rows = [
         {
             "clip_id": one.clip_id,
@@ -153,7 +153,7 @@ def from_music_evidence(performances: Sequence[Performance], found: Evidence, n_
 
 
 def to_evidence(table: pa.Table) -> Evidence:
-    """Unpack what music tells."""
+    """Unpack how much music helps to predict motions."""
     columns = ("music_log_probability", "bigram_log_probability", "shuffled_log_probability")
     music, bigram, shuffled = (to_numbers(table[c]).astype(np.float64) for c in columns)
     p = float(table["chance_probability"][0].as_py()) if table.num_rows else 1.0

@@ -30,12 +30,12 @@ UP = np.array([0.0, 1.0, 0.0])
 """By convention."""
 
 SAY = 0.25
-"""Share of a pose above which the partner of a blend, too, must have its foot planted. Chosen by hand."""
+"""Share of a blended pose above which the second clip's foot must be planted as well. Chosen by hand."""
 
 
 @dataclass(frozen=True)
 class FootLockGive:
-    """How far the body gives way to planted feet.
+    """Limits of how far root and legs move to keep planted feet where they stand.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class FootLockGive:
 
 
 def planted_feet(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> FootContacts:
-    """Tell which foot is planted when, by the clips through the lineage.
+    """Find which foot is planted when, from the clips through the lineage.
 
     Blending must not get to decide what counts as contact: the dominant clip of a frame does, and its partner as well
     where that has more than :data:`SAY` of the pose. A foot that lands just before a seam and swings after it does not

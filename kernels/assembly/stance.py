@@ -42,7 +42,7 @@ def clip_contacts(clip: Clip, position_xyz_m: Float) -> FootContacts:
 
 
 def planted_share(contacts: FootContacts, start_s: float, end_s: float, frame_rate_hz: float) -> Float:
-    """Tell for which part of a stretch of a clip each point of its feet is planted.
+    """Measure for which part of a stretch of a clip each point of its feet is planted.
 
     Parameters
     ----------

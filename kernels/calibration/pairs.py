@@ -40,7 +40,7 @@ def pair_residuals(rotation_matrix: Float, position_xyz_m: Float) -> Float:
 
 
 def pair_costs(rotation_matrix: Float, position_xyz_m: Float) -> Float:
-    """Tell how little of every sensor's movement another one explains through a common joint.
+    """Measure how little of every sensor's movement another one explains through a common joint.
 
     Parameters
     ----------

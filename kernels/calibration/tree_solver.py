@@ -47,8 +47,8 @@ DAMPING = 1e-3
 
 POSITION_SIGMA_M = 0.005
 ROTATION_SIGMA_RAD = float(np.radians(1.5))
-"""How far sensors stray from their bones. Flat on purpose: estimates, tried on made-up recordings, run away, for the
-poses soak up the residuals. Chosen by hand about the noise of a magnetic suit."""
+"""How far sensors stray from their bones: the same for all. Estimates for each sensor, tried on made-up recordings,
+shrink without end, because poses fit the sensor that is trusted most. Chosen by hand about a magnetic suit's noise."""
 
 KINDNESS = 16.0
 """Squared residual, in variances, at which a measurement's weight falls to a quarter from the second step on, as

@@ -141,7 +141,7 @@ def admitted(pins: Sequence[Pin], n_intervals: int, n_nodes: int) -> Mask:
 
 
 class Danceable(Protocol):
-    """What tells whether pins can be kept; pins count in music intervals."""
+    """What answers whether pins can be kept; pins count in music intervals."""
 
     n_intervals: int
 

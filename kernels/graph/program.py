@@ -7,7 +7,7 @@ u's clip and ends on beat k + d. A *stay* lasts from one transition to the next;
 one, up to M, where a stay is long enough. Two costs to go::
 
     start[r, k, u]  = min over steps of  cost(k, u, step) + price(u, step) + arrive[r + d, k + d, u after m beats]
-    arrive[r, k, v] = min(start[r, k, v], hurry(r) + min over transitions v → u of  cost(v → u) + start[0, k, u])
+    arrive[r, k, v] = min(start[r, k, v], stay_cost(r) + min over transitions v → u of  cost(v → u) + start[0, k, u])
 
 with r + d taken as M where it is more. The inner minimum does not depend on r, so a beat costs M · N · |steps| + E
 operations, not M · E. The first stay begins with the song (r = 0); the last may end with it however short it is.

@@ -39,7 +39,7 @@ def likeness(state: Int, models: Sequence[Model]) -> Float:
 
 
 def identify(state: Int, models: Sequence[Model]) -> int:
-    """Tell whose dance it is: the model it is most like, of equals the first; arguments as :func:`likeness`."""
+    """Judge whose dance it is: the model it is most like, of equals the first; arguments as :func:`likeness`."""
     return int(np.argmax(likeness(state, models)))
 
 
@@ -68,7 +68,7 @@ def pose_windows(position_xyz_m: Float, frame_rate_hz: float) -> Float:
 
 
 def nearest_dancer(dance: Float, known: Sequence[Float]) -> int:
-    """Tell whose dance it is by the stretches of known dances that its own are nearest to.
+    """Judge whose dance it is by the stretches of known dances that its own are nearest to.
 
     Parameters
     ----------

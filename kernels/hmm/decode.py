@@ -27,8 +27,8 @@ FAR = 8.0
 """Price of a seam to any other motion: dear, but there is always one. Chosen by hand: eight of the smoothest seams."""
 
 REPETITION = 0.25
-"""Price of each earlier showing of a motion: a quarter of a choice of recordings', for here it costs likelihood too.
-Chosen by hand."""
+"""Price of each earlier showing of a motion: a quarter of that in the choice of recordings, since here the model, too,
+has its price. Chosen by hand."""
 WINDOW, LOOK_AHEAD = 16, 12
 """Intervals that are danced at a time, and looked at beyond. Chosen by hand; looking farther was tried on three songs
 of real clips and gained nothing."""

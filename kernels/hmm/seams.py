@@ -16,7 +16,7 @@ from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float, Int
 
 SEAM = 1.0
-"""Price of any seam, however alike the poses: 1 by definition, other prices are told in it. Dearer seams were tried on
+"""Price of any seam, however alike the poses: 1 by definition, the unit of all other prices. Dearer seams were tried on
 three songs of real clips and left."""
 
 POOR_M2 = 0.05

@@ -187,7 +187,7 @@ def squared_distances(points: Float, centre: Float) -> Float:
 
 
 def clearness(points: Float, label: Int, k: int) -> float:
-    """Tell how clear clusters are: the silhouette by centroids, mean of (b - a) / max(a, b).
+    """Measure how clear clusters are: the silhouette by centroids, mean of (b - a) / max(a, b).
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _states(vectors: Float, label: Int, tried: tuple[tuple[int, float], ...]) ->
 
 
 def assign(vectors: Float, states: States) -> tuple[Int, Float]:
-    """Tell the basic motion of each motion.
+    """Find the basic motion of each motion.
 
     Parameters
     ----------

@@ -150,7 +150,7 @@ class Refinement:
         return self._best
 
     def _starts(self, bounds: Bounds, n_bytes: int) -> int:
-        """Tell how many starts at each scale are laid out at a time."""
+        """Count the starts of each scale that are laid out at a time."""
         n_scales, n_segments = self._layout.counts.shape[1], len(self._floor)
         groups = min(n_bytes // (bounds.n_blocks * RANK * 4), _CELLS // n_segments) // n_scales
         return max(int(groups), _LEAST_GROUPS) * bounds.fold

@@ -100,7 +100,7 @@ def usable_frames(position_m: Float, frame_rate_hz: float) -> tuple[int, int]:
 def accents(
     position_m: Float, frame_rate_hz: float, *, time_s: Float, sigma_s: float = 0.05, half_drop_m_per_s: float = 0.05
 ) -> Float:
-    """Tell how plainly the body stops at given moments: towards 1 on a marked stop, 0 far from any (ours).
+    """Measure how plainly the body stops at given moments: towards 1 on a marked stop, 0 far from any (ours).
 
     A motion beat of the largest component is not always a moment a viewer sees as one; a choice of beats weighed by
     this is. A stop counts by how much speed is lost on it, so that a dance is not sought among people who hardly move.

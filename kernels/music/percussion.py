@@ -262,7 +262,7 @@ def loudest_in(hits: Hits, edge_s: Float, *, ahead_s: float = 0.0) -> Float:
 
 
 def spread_bands(counts: Float) -> Float:
-    """Give what was heard in a band to all its drums alike, (K, 47) to (K, 47): audio tells no more than the band."""
+    """Spread what was heard in a band over all its drums alike, (K, 47) to (K, 47): audio has the band alone."""
     out = np.zeros_like(counts)
     for band in (LOW, MIDDLE, HIGH):
         inside = np.equal(BAND_OF_KEY, band)

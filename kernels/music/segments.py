@@ -99,7 +99,7 @@ def _same_spread(values: Float) -> Float:
 
 
 def novelty(feature: Float, *, reach: int = KERNEL_BEATS) -> Float:
-    """Tell how much each beat's music differs from what was before it, by a tapered checkerboard kernel.
+    """Measure how much the music after each beat differs from that before, by a tapered checkerboard kernel.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def fault(device: cl.Device) -> str:
 
 
 def first_line(error: Exception) -> str:
-    """Give the one line of a driver's error that tells most: the compiler's first, else the error's own.
+    """Choose one line of a driver's error to show: the compiler's first, else the error's own.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A stretch of motion told by statistics of its channels: no training, and the ground the trained encoders stand on."""
+"""A stretch of motion described by statistics of its channels: not trained; the trained encoders build on it."""
 
 from __future__ import annotations
 

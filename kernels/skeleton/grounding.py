@@ -36,7 +36,7 @@ LEG_M = _THIGH_M + _SHIN_M
 
 @dataclass(frozen=True)
 class GroundingGive:
-    """How far the body gives way to keep its feet planted.
+    """Limits of how far root and legs move to keep planted feet where they stand.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def _points(position_xyz_m: Float) -> Float:
 
 
 def _is_lower(toes_xyz_m: Float) -> NDArray[np.bool_]:
-    """Tell the lower foot, (F, 2): something to go by where nothing is planted."""
+    """Find the lower foot, (F, 2): it stands in where nothing is planted."""
     height = toes_xyz_m[..., 1]
     return np.asarray(height <= height.min(axis=1, keepdims=True), np.bool_)
 

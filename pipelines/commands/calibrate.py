@@ -107,7 +107,7 @@ def _chosen(settings: Settings, method: str | None, iterations: int | None) -> S
 
 
 def _refusal(recording: Path, error: CalibrationError) -> Outcome:
-    """Say every fault; what was found of the other joints is still told to a machine."""
+    """Report every fault; facts have what was found of the other joints."""
     faults = [
         {"severity": f.severity, "sensor": f.sensor, "frame_index": f.frame_index, "sentence": f.sentence}
         for f in error.findings

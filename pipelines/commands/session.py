@@ -24,7 +24,7 @@ class Session:
     def __init__(self, studio: StudioFolder, progress: Callable[[], Any]) -> None:
         self.studio = studio
         self.notes: list[str] = []
-        """What the person who waits was told: which device failed, what is slow and why."""
+        """Lines shown to the person who waits: which device failed, what is slow and why."""
         self.devices = Devices(studio.settings().opencl.device, say=self._say)
         check_settings(studio, self.devices)
         self.state = freshness(studio)

@@ -1,7 +1,7 @@
 """The lake on disk: ``<lake>/<table>/<partition>.parquet``, each file with its stamp in the footer.
 
-The only place that writes Parquet. A file is written beside and renamed, so a killed run leaves the old one or the new
-one. Files of one table and content are byte-equal.
+The only place that writes the lake's Parquet files. A file is written beside and renamed, so a killed run leaves the
+old one or the new one. Files of one table and content are byte-equal.
 """
 
 from collections.abc import Iterable
