@@ -76,10 +76,10 @@ class MotionGraphSettings(_Checked):
     """Which beat of which clip may follow which."""
 
     metric: str = key(
-        "position", "'position' (equation 18) or 'rotation' (equation 17).", values=("position", "rotation")
+        "position", "'position' or 'rotation': equations 18 and 17 of [Xu2015].", values=("position", "rotation")
     )
     threshold: float = key(
-        0.0, "Equation 19: a transition is allowed below this ratio; 0: the built-in value.", least=0
+        0.0, "A transition is allowed below this ratio (equation 19 of [Xu2015]); 0: the built-in value.", least=0
     )
     neighbours: int = key(20, "Transitions kept for each beat.", least=1)
     mirror: bool = key(False, "Dance clips mirrored, left for right, as well: twice the catalogue.")
@@ -100,12 +100,12 @@ class PathSettings(_Checked):
     intensity_weight: float = key(6.0, "Weight of movement unlike the music in strength.", least=0)
     seam_cost: float = key(1.0, "Price of any seam: more makes phrases longer.", least=0)
     stay_beats: int = key(
-        4, "Beats of the music that a clip should be stayed with between two seams.", least=1, most=32
+        4, "Beats of the music from one seam to the next below which the second seam costs more.", least=1, most=32
     )
     stay_cost: float = key(4.0, "Price of a seam right after another, falling evenly to 0 at `stay_beats`.", least=0)
     repeat: str = key(
         "none",
-        "'structure': where the song plays a part again, its dance is danced again; 'none': each part has its own.",
+        "'structure': where the song repeats a part, the dance repeats, too; 'none': every part has its own dance.",
         values=("none", "structure"),
     )
     beat_weight: float = key(1.0, "Weight of beats on which the body does not visibly stop.", least=0)
@@ -149,7 +149,7 @@ class MatchPathSettings(_Checked):
     repetition_weight: float = key(1.0, "Weight of showing again what was shown.", least=0)
     unconnected_cost: float = key(
         0.0,
-        "Price of a seam between poses beyond the thresholds; 0: as few of them as can be, before any cost counts.",
+        "Price of a seam between poses beyond the thresholds; 0: as few such seams as possible, at any cost.",
         least=0,
     )
     other_starts: int = key(
@@ -157,7 +157,7 @@ class MatchPathSettings(_Checked):
     )
     snap_loss_ratio: float = key(
         0.05,
-        "A piece starts on a beat of its clip where that loses less than this share of its score.",
+        "A piece is moved to start on a beat of its clip if its score loses less than this share.",
         least=0,
         most=1,
     )
@@ -177,17 +177,17 @@ class SearchSettings(_Checked):
     )
     training_windows: int = key(4000, "Windows the encoder learns from at most.", least=2, most=100000)
     training_steps: int = key(250, "Steps of its training at most.", least=1, most=100000)
-    seed: int = key(0, "Where its training begins; another seed, another encoder.", least=0)
+    seed: int = key(0, "Number that training starts from; another number gives another encoder.", least=0)
 
 
 @dataclass(frozen=True)
 class BasicMotionSettings(_Checked):
-    """How clips are cut into motions, and these sorted into kinds."""
+    """How clips are cut into motions, and these clustered to basic motions."""
 
-    states: int = key(0, "Kinds of motions; 0: chosen by how clearly they differ.", least=0, most=200)
+    states: int = key(0, "Number of basic motions; 0: chosen by how clearly they differ.", least=0, most=200)
     shortest_s: float = key(0.25, "No motion is shorter.", least=0.1, most=1.0)
     longest_s: float = key(2.0, "No motion is longer; at least twice shortest_s.", least=1.0, most=8.0)
-    seed: int = key(0, "Where the clusters start.", least=0)
+    seed: int = key(0, "Number that clustering starts from.", least=0)
 
     def __post_init__(self) -> None:
         check(self)
@@ -206,7 +206,7 @@ class ChoreographyModelSettings(_Checked):
         "'product': all drums of a motion, each by itself; 'single': the loudest, as [Kameda2009].",
         values=("product", "single"),
     )
-    melody_weight: float = key(0.5, "How much the way the melody goes counts against the drums.", least=0, most=10)
+    melody_weight: float = key(0.5, "Weight of the melody, where the drums have 1.", least=0, most=10)
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,10 @@ class HmmPathSettings(_Checked):
     warp_weight: float = key(1.0, "Weight of leaving a motion's own pace.", least=0)
     repetition_weight: float = key(1.0, "Weight of showing the same recording again.", least=0)
     temperature: float = key(
-        0.0, "0: the most probable dance; 1: one drawn as the dancer would; --temperature overrides.", least=0, most=10
+        0.0,
+        "0: the most probable dance; 1: drawn by the model's probabilities; --temperature overrides.",
+        least=0,
+        most=10,
     )
 
 
@@ -234,7 +237,7 @@ class DanceSettings(_Checked):
         "'slerp' (eased), 'linear_slerp' ([Xu2015]) or 'inertial' (springs both ways): docs/seams.md.",
         values=("slerp", "linear_slerp", "inertial"),
     )
-    lock_feet: bool = key(True, "Keep feet where they stand: root and legs give way to contacts of the clips.")
+    lock_feet: bool = key(True, "Keep planted feet where they stand, by moving root and legs.")
 
 
 @dataclass(frozen=True)

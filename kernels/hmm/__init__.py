@@ -1,1 +1,1 @@
-"""What the dancer would do: basic motions as states, the music as what they emit [Kameda2009]."""
+"""Dancing by a model of a dancer: basic motions as states, the music as their emissions [Kameda2009]."""
