@@ -1,5 +1,7 @@
 """Assembly: exact playing, seams that carry place and heading, lineage of every frame."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from kernels import rotation
 from kernels.assembly.blend import assemble, sample, turn
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL
+from kernels.synthetic.dancer import Figure, pose
 from kernels.types import Clip
 
 
@@ -153,3 +156,75 @@ def test_refusals(clips, phrases):
         assemble(steps, {}, skeleton=CANONICAL, frame_rate_hz=30.0, duration_s=1.0)
     with pytest.raises(ValueError, match="want > 0"):
         assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=0.0, duration_s=1.0)
+
+
+@pytest.fixture
+def crouching(clips):
+    """A body that stands with its knees bent, 0.2 m lower, and one that stands upright; both on the floor."""
+
+    def stand(lower_m):
+        n = 150
+        foot = np.zeros((2, n, 3))
+        foot[..., 0], foot[..., 1] = np.array([[0.1], [-0.1]]), 0.08
+        zero, arms = np.zeros(n), np.full((2, n), 0.3)
+        hips = np.tile([0.0, 0.91 - lower_m, 0.0], (n, 1))
+        return pose(Figure(hips, zero, zero, zero, zero, foot, 0 * arms, arms, 0 * arms, arms), 30.0)
+
+    return {"upright": stand(0.0), "low": stand(0.2)}
+
+
+@pytest.mark.parametrize("shape", ["slerp", "linear_slerp", "inertial"])
+def test_the_lower_foot_keeps_its_height_through_a_blend(crouching, phrases, shape):
+    steps = phrases(("upright", 0.5, 4, 0.5, 0.5), ("low", 0.5, 4, 0.5, 0.5), blend_s=0.4)
+    made = assemble(steps, crouching, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=4.0, shape=shape)
+    feet = [k for k, name in enumerate(CANONICAL.joints) if name.endswith(("Foot", "Toes"))]
+    lowest_m = made.position_xyz_m[:, feet, 1].min(axis=1)
+    assert np.ptp(made.root_xyz_m[:, 1]) > 0.19
+    np.testing.assert_allclose(lowest_m, lowest_m[0], atol=1e-6)
+
+
+def test_of_clips_at_different_heights_the_lower_foot_passes_from_one_to_the_other(crouching, phrases):
+    raised = replace(crouching["low"], root_xyz_m=crouching["low"].root_xyz_m + np.array([0.0, 0.1, 0.0]))
+    steps = phrases(("upright", 0.5, 4, 0.5, 0.5), ("raised", 0.5, 4, 0.5, 0.5), blend_s=0.4)
+    both = {"upright": crouching["upright"], "raised": raised}
+    made = assemble(steps, both, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=4.0)
+    feet = [k for k, name in enumerate(CANONICAL.joints) if name.endswith(("Foot", "Toes"))]
+    rise_m = made.position_xyz_m[:, feet, 1].min(axis=1) - made.position_xyz_m[0, feet, 1].min()
+    assert rise_m[120] == pytest.approx(0.05, abs=1e-6)
+    assert rise_m[-1] == pytest.approx(0.1, abs=1e-6)
+    assert (np.diff(rise_m) >= -1e-9).all()
+
+
+def test_the_first_phrase_is_played_from_the_first_frame_and_the_last_to_the_end(clips, phrases):
+    """No blend before the first step: what lies before it in the clip is not shown, and nothing stands still."""
+    steps = phrases(("step", 1.0, 4, 0.5, 0.5), ("wave", 0.75, 4, 0.5, 0.5))
+    made = dance(steps, clips)
+    assert made.lineage.clip_time_s[0] == 1.0
+    assert made.lineage.step_index[-1] == 7
+    assert made.lineage.clip_time_s[-1] == pytest.approx(2.75)
+    assert (made.lineage.blend_step_index[[0, -1]] == -1).all()
+
+
+def test_clips_of_two_and_three_frames_are_joined_by_lines(clips):
+    for n in (2, 3):
+        short = Clip(CANONICAL, 10.0, clips["step"].root_xyz_m[:n] * 1.0, clips["step"].rotation_wxyz[:n])
+        root, _ = sample(short, np.array([0.05]))
+        np.testing.assert_allclose(root[0], short.root_xyz_m[:2].mean(axis=0), atol=1e-12)
+    four = Clip(CANONICAL, 10.0, np.array([0.0, 0.0, 1.0, 1.0])[:, None] * np.ones(3), clips["step"].rotation_wxyz[:4])
+    assert sample(four, np.array([0.05]))[0][0, 0] != 0.0
+
+
+def test_a_rotation_whose_sign_turns_over_within_a_clip_is_the_same_motion(clips):
+    clip = clips["wave"]
+    sign = np.where(np.arange(clip.n_frames) % 2, -1.0, 1.0)[:, None, None]
+    flipped = replace(clip, rotation_wxyz=clip.rotation_wxyz * sign)
+    t = np.linspace(0.1, 3.0, 40)
+    assert rotation.angle_between(sample(flipped, t)[1], sample(clip, t)[1]).max() < 1e-6
+
+
+def test_every_length_and_rate_must_be_above_nothing(clips, phrases):
+    steps = phrases(("step", 0.25, 2, 0.5, 0.5))
+    with pytest.raises(ValueError, match="duration_s: want > 0"):
+        assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=30.0, duration_s=0.0)
+    with pytest.raises(ValueError, match="at least one"):
+        assemble(phrases(), clips, skeleton=CANONICAL, frame_rate_hz=30.0, duration_s=1.0)

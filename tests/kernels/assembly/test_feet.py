@@ -1,11 +1,13 @@
 """Planted feet: found through the lineage, held, and nothing else moved."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kernels import rotation
 from kernels.assembly.blend import Dance, Lineage, assemble
-from kernels.assembly.feet import SAY, lock_feet, planted_feet
+from kernels.assembly.feet import SAY, _within_reach, lock_feet, planted_feet
 from kernels.assembly.foot_quality import foot_measures
 from kernels.assembly.seam_quality import seam_measures
 from kernels.assembly.stance import clip_contacts
@@ -175,3 +177,83 @@ def test_a_foot_that_swings_through_the_floor_is_raised():
     assert position[:, grounding.TOES, 1].min() < -0.03
     assert held.min() > -1e-6
     np.testing.assert_allclose(held[:139], position[:139, grounding.TOES, 1], atol=2e-3)
+
+
+def knee_angles(position):
+    knee = position[:, grounding.KNEES] - position[:, grounding.THIGHS]
+    shin = position[:, grounding.ANKLES] - position[:, grounding.KNEES]
+    return np.arccos((knee * shin).sum(-1) / np.linalg.norm(knee, axis=-1) / np.linalg.norm(shin, axis=-1))
+
+
+@pytest.mark.parametrize("bend_rad", [0.1, 0.3])
+def test_hips_sink_with_feet_held_apart_so_that_knees_keep_their_bend(bend_rad):
+    mixed, planted = held_apart(0.2, bend_rad=bend_rad)
+    held = lock_feet(mixed, planted)
+    off = np.abs(knee_angles(held.position_xyz_m) - knee_angles(mixed.position_xyz_m))
+    assert off.max() < 0.01
+    assert np.abs(held.root_xyz_m[:, 1] - mixed.root_xyz_m[:, 1]).max() > 0.004
+
+
+def turned_in_place(angle_rad, *, is_blend):
+    """A standing body that turns about the vertical within 0.4 s, on flat planted feet; rate 60."""
+    mixed, planted = held_apart(0.0)
+    share = np.clip((mixed.time_s - 1.3) / 0.4, 0, 1)
+    local = mixed.rotation_wxyz.copy()
+    local[:, 0] = rotation.mul(rotation.from_heading(angle_rad * share**2 * (3 - 2 * share)), local[:, 0])
+    position, _ = kinematics.forward(CANONICAL, mixed.root_xyz_m, local)
+    lineage = mixed.lineage if is_blend else replace(mixed.lineage, blend_weight=np.zeros(len(local)))
+    return replace(mixed, rotation_wxyz=local, position_xyz_m=position, lineage=lineage), planted
+
+
+def foot_turn_rad(position):
+    """How far the feet turn from the first of the frames around the blend to the last, left and right."""
+    foot = position[:, grounding.TOES] - position[:, grounding.ANKLES]
+    heading = np.unwrap(np.arctan2(foot[..., 0], foot[..., 2]), axis=0)
+    return heading[103] - heading[77]
+
+
+def test_flat_feet_do_not_turn_through_a_blend_but_do_as_their_clip_does():
+    through, planted = turned_in_place(0.2, is_blend=True)
+    np.testing.assert_allclose(foot_turn_rad(through.position_xyz_m), 0.2, atol=0.01)
+    assert np.abs(foot_turn_rad(lock_feet(through, planted).position_xyz_m)).max() < 0.02
+    within, _ = turned_in_place(0.2, is_blend=False)
+    np.testing.assert_allclose(foot_turn_rad(lock_feet(within, planted).position_xyz_m), 0.2, atol=0.01)
+
+
+def test_feet_on_their_heels_turn_freely_through_a_blend():
+    through, planted = turned_in_place(0.2, is_blend=True)
+    heels = replace(planted, toes=np.zeros_like(planted.toes))
+    np.testing.assert_allclose(foot_turn_rad(lock_feet(through, heels).position_xyz_m), 0.2, atol=0.02)
+
+
+@pytest.mark.parametrize("is_blend", [True, False])
+def test_planted_feet_pass_through_a_blend_at_the_heights_before_and_after_it(is_blend):
+    mixed, planted = held_apart(0.0)
+    root = mixed.root_xyz_m.copy()
+    root[:, 1] += 0.03 * np.sin(np.pi * np.clip((mixed.time_s - 1.3) / 0.4, 0, 1)) ** 2
+    position, _ = kinematics.forward(CANONICAL, root, mixed.rotation_wxyz)
+    weight = mixed.lineage.blend_weight
+    weight = np.where((mixed.time_s > 1.3) & (mixed.time_s < 1.7), np.maximum(weight, 1e-3), 0.0) * is_blend
+    lifted = replace(
+        mixed, root_xyz_m=root, position_xyz_m=position, lineage=replace(mixed.lineage, blend_weight=weight)
+    )
+    height = lock_feet(lifted, planted).position_xyz_m[:, grounding.TOES, 1]
+    rise = height[90] - height[60]
+    assert (np.abs(rise) < 0.012).all() if is_blend else (rise > 0.028).all()
+
+
+def test_a_leg_gives_no_more_than_half_of_what_it_has_left_to_stretch():
+    mixed, _ = held_apart(0.0, bend_rad=0.4)
+    position = mixed.position_xyz_m[:1]
+    hip, ankle = position[:, grounding.THIGHS], position[:, grounding.ANKLES]
+    left_m = grounding.LEG_M - np.linalg.norm(ankle - hip, axis=-1)
+    down = np.array([0.0, -1.0, 0.0])
+    for move_m in (0.005, 0.05, 0.5):
+        given = ankle + _within_reach(position, np.full((1, 2, 1), move_m) * down, 0.5)
+        longer_m = np.linalg.norm(given - hip, axis=-1) - np.linalg.norm(ankle - hip, axis=-1)
+        assert (longer_m < 0.5 * left_m).all()
+        assert (longer_m > 0).all()
+    # A small move is made nearly whole, one that shortens the leg wholly.
+    near = _within_reach(position, np.full((1, 2, 1), 0.001) * down, 0.5)
+    np.testing.assert_allclose(near[..., 1], -0.001, atol=1e-4)
+    np.testing.assert_allclose(_within_reach(position, np.full((1, 2, 1), -0.1) * down, 0.5)[..., 1], 0.1, atol=1e-9)

@@ -1,5 +1,7 @@
 """Measures of a dance: closed forms, chance, and negative and positive controls."""
 
+from dataclasses import replace
+
 import mir_eval
 import numpy as np
 import pytest
@@ -141,3 +143,97 @@ def test_movement_that_follows_the_music_correlates_by_rank(clips):
     assert values(quality.intensity_measures(made, -music, grid_s))["intensity_rank_correlation_ratio"] < -0.99
     assert values(quality.intensity_measures(made, np.ones(10), grid_s))["intensity_rank_correlation_ratio"] == 0
     assert values(quality.intensity_measures(made, music[:2], grid_s[:3]))["intensity_rank_correlation_ratio"] == 0
+
+
+def test_a_p_value_counts_the_dance_itself_so_that_it_is_never_nothing(phrases, dance):
+    made = dance(phrases(("wave", 0.25, 14, 0.5, 0.5)))
+    found = values(quality.beat_measures(made, np.arange(0, 7, 0.5), n_shifts=19))
+    assert found["beat_p_probability"] == found["beat_f_p_probability"] == 1 / 20
+
+
+def test_a_shift_as_good_as_the_dance_counts_against_it(phrases, dance):
+    """Without beats of the music every shift is as good: no dance is above chance."""
+    made = dance(phrases(("wave", 0.25, 6, 0.5, 0.5)))
+    found = quality.beat_measures(made, np.array([-1.0, 99.0]), n_shifts=9)
+    assert values(found)["beat_p_probability"] == values(found)["beat_f_p_probability"] == 1
+    assert values(found)["beat_alignment_corrected_ratio"] == 0
+    assert not passed(found)["beat_alignment_corrected_ratio"]
+
+
+def test_music_beats_outside_the_dance_are_not_missed(phrases, dance):
+    made = dance(phrases(("wave", 0.25, 8, 0.5, 0.5)))
+    inside = np.arange(0, 4.01, 0.5)
+    more = np.concatenate([[-0.5], inside, [4.5, 5.0]])
+    assert quality.beat_measures(made, more, n_shifts=9) == quality.beat_measures(made, inside, n_shifts=9)
+
+
+def test_a_beat_is_met_once_and_only_within_the_tolerance():
+    music = np.array([1.0, 2.0])
+    assert quality.f_measure(np.array([1.07, 2.071]), music) == 0.5
+    assert quality.f_measure(np.array([0.95, 1.05]), np.array([1.0])) == pytest.approx(2 / 3)
+    assert quality.f_measure(np.array([1.0, 1.0]), np.array([1.0, 1.0])) == 1
+
+
+def test_alignment_looks_at_the_nearest_beat_on_either_side():
+    near = np.exp(-0.5)
+    assert quality.beat_alignment(np.array([0.95, 3.0]), np.array([1.0])) == pytest.approx(near)
+    assert quality.beat_alignment(np.array([0.0, 1.05]), np.array([1.0])) == pytest.approx(near)
+    # before the first and after the last
+    assert quality.beat_alignment(np.array([1.0, 2.0, 3.0]), np.array([0.95, 3.05])) == pytest.approx(near)
+
+
+def test_the_last_block_is_as_long_as_what_is_left_of_the_song():
+    rng = np.random.default_rng(4)
+    beats = np.arange(0.1, 9.0, 0.3)
+    for _ in range(50):
+        shifted = quality.block_shifted(beats, 9.0, rng=rng)
+        assert shifted.max() < 9.0
+        assert (shifted[beats >= 8.0] >= 8.0).all()
+
+
+def test_lag_counts_only_steps_that_start_on_a_heard_beat(phrases, dance):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.47))
+    made = dance(steps)
+    (none,) = quality.lag_measures(made, steps, steps.song_start_s + 0.1)
+    assert (none.value, none.is_passed) == (0.0, True)
+    (none,) = quality.lag_measures(made, steps, np.zeros(0))
+    assert none.value == 0
+    shifted = replace(made, lineage=replace(made.lineage, clip_time_s=made.lineage.clip_time_s - 0.05))
+    (one,) = quality.lag_measures(shifted, steps, steps.song_start_s[2:3])
+    assert one.value == pytest.approx(47, abs=2)
+
+
+def test_a_lag_of_half_a_frame_passes_and_more_does_not(phrases, dance):
+    steps = phrases(("step", 0.25, 6, 0.5, 0.5))
+    made = dance(steps)
+    for late_s, is_passed in ((0.4 / 60, True), (0.6 / 60, False)):
+        late = replace(made, lineage=replace(made.lineage, clip_time_s=made.lineage.clip_time_s - late_s))
+        assert quality.lag_measures(late, steps, steps.song_start_s[1:])[0].is_passed == is_passed
+
+
+def test_warps_on_their_very_bounds_pass(phrases):
+    for song_step_s, is_easy, is_hard in (
+        (0.45, True, True),
+        (0.55, True, True),
+        (0.4, False, True),
+        (0.39, False, False),
+    ):
+        found = quality.warp_measures(phrases(("a", 0.0, 6, 0.5, song_step_s)))
+        assert values(found)["warp_easy_ratio"] == (1.0 if is_easy else 0.0)
+        assert (passed(found)["warp_least_ratio"] and passed(found)["warp_most_ratio"]) == is_hard
+    slow = quality.warp_measures(phrases(("a", 0.0, 6, 0.5, 0.64)))
+    assert not passed(slow)["warp_most_ratio"]
+    assert passed(slow)["warp_least_ratio"]
+    nineteen = quality.warp_measures(phrases(("a", 0.0, 19, 0.5, 0.5), ("a", 0.0, 1, 0.5, 0.6)))
+    assert passed(nineteen)["warp_easy_ratio"]
+
+
+def test_intensity_counts_intervals_inside_the_dance_alone(clips):
+    position = np.zeros((121, 2, 3))
+    position[1:, :, 0] = np.cumsum(np.repeat([0.1, 0.5, 0.2, 0.9], 30))[:, None] / 30
+    made = type("Moved", (), {"position_xyz_m": position, "frame_rate_hz": 30.0, "time_s": np.arange(121) / 30})()
+    # the intervals before the start and after the end would turn the order round
+    grid_s, music = np.arange(-1.0, 7.0), np.array([99, 1, 5, 2, 10, 99, 99.0])
+    assert values(quality.intensity_measures(made, music, grid_s))["intensity_rank_correlation_ratio"] == pytest.approx(
+        1
+    )

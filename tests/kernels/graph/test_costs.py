@@ -5,6 +5,7 @@ import pytest
 
 from kernels.graph.costs import (
     PathCosts,
+    beat_cost,
     intensity_price,
     is_within,
     jump_back_cost,
@@ -13,6 +14,7 @@ from kernels.graph.costs import (
     transition_cost,
     usage_cost,
     warp_cost,
+    weight_scale,
 )
 
 
@@ -117,3 +119,61 @@ def test_strong_music_wants_much_movement(make_graph):
     rank = (np.arange(4) + 0.5) / 4
     np.testing.assert_allclose(price, 2 * np.stack([(0.75 - rank) ** 2, (0.25 - rank) ** 2]))
     np.testing.assert_array_equal(price, intensity_price(np.array([2.0, 0.5]), moving, weight=2.0))
+
+
+def test_where_both_clips_are_wild_the_median_clip_is_what_is_usual(make_graph):
+    """Three calm clips and two wild ones: between the wild ones a peak is measured against the calm."""
+    graph = make_graph([[0, 1, 2]] * 5, [(10, 13, 1.0)], both_ways=False)
+    usual = np.repeat([100.0, 100.0, 100.0, 400.0, 800.0], 3)
+    loud = replace(graph, peak_jerk=np.where(np.arange(15) == 13, 1600.0, 50.0), usual_jerk=usual)
+    np.testing.assert_allclose(rough_cost(loud, PathCosts(rough=0.5)), [0.5 * 4**2])
+    calm = replace(graph, peak_jerk=np.full(15, 100.0), usual_jerk=usual)
+    np.testing.assert_array_equal(rough_cost(calm, PathCosts()), [0.0])
+
+
+def test_the_larger_peak_and_the_calmer_clip_decide_whichever_side_they_are_on(make_graph):
+    graph = make_graph([[0, 1, 2]] * 3, [(1, 4, 1.0)])
+    usual = np.repeat([100.0, 200.0, 200.0], 3)
+    for loud in (1, 4):
+        peak = np.where(np.arange(9) == loud, 800.0, 10.0)
+        cost = rough_cost(replace(graph, peak_jerk=peak, usual_jerk=usual), PathCosts(rough=1.0))
+        np.testing.assert_allclose(cost, [9.0, 9.0])
+
+
+def test_roughness_of_one_kind_alone_is_not_known(make_graph):
+    graph = make_graph([[0, 1, 2], [0, 1, 2]], [(1, 4, 1.0)])
+    for known in ({"peak_jerk": np.full(6, 900.0)}, {"usual_jerk": np.full(6, 9.0)}):
+        np.testing.assert_array_equal(rough_cost(replace(graph, **known), PathCosts()), 0)
+
+
+def test_going_back_to_the_very_moment_and_by_the_whole_window_costs(make_graph):
+    graph = make_graph([[0, 1, 9, 9.5], [0, 1]], [(2, 1, 1.0), (2, 2, 1.0), (2, 0, 1.0), (1, 2, 1.0)], both_ways=False)
+    edge = list(zip(graph.source.tolist(), graph.target.tolist(), strict=True))
+    cost = dict(zip(edge, jump_back_cost(graph, PathCosts(jump_back=0.7, jump_back_window_s=8.0)), strict=True))
+    assert cost == {(2, 1): 0.7, (2, 2): 0.7, (2, 0): 0.0, (1, 2): 0.0}
+
+
+def test_missed_beats_are_what_a_step_covers_less_how_plainly_it_stops(make_graph):
+    graph = replace(make_graph([[0, 1, 2]]), accent=np.array([0.0, 0.25, 1.0]))
+    costs = PathCosts(missed_beat=2.0)
+    np.testing.assert_allclose(beat_cost(graph, np.array([1, 2, -1]), 1, costs), [1.5, 0.0, 0.0])
+    np.testing.assert_allclose(beat_cost(graph, np.array([1, 2, -1]), 2, costs), [3.5, 2.0, 0.0])
+    np.testing.assert_array_equal(beat_cost(make_graph([[0, 1, 2]]), np.array([1, 2, -1]), 1, costs), np.zeros(3))
+
+
+def test_the_weight_of_a_poor_seam_is_the_costs_own_else_the_graphs_else_one(make_graph):
+    graph = make_graph([[0, 1, 2], [0, 1, 2]], [(1, 4, 2.0), (2, 3, 8.0)])
+    assert weight_scale(graph, PathCosts(transition_scale=4.0)) == 4.0
+    assert weight_scale(graph, PathCosts()) == np.percentile(graph.weight, 95)
+    assert weight_scale(make_graph([[0, 1]]), PathCosts()) == 1.0
+    assert weight_scale(make_graph([[0, 1], [0, 1]], [(1, 2, 0.0)]), PathCosts()) == 1.0
+
+
+def test_a_warp_on_its_soft_bound_is_inside(make_graph):
+    costs = PathCosts(warp=0.0)
+    on, past = warp_cost(np.array([1.1, 1.1001]), costs)
+    assert on == 0
+    assert past >= costs.leaving
+    low_on, low_past = warp_cost(np.array([0.9, 0.8999]), costs)
+    assert low_on == 0
+    assert low_past >= costs.leaving

@@ -214,3 +214,128 @@ def test_soft_wishes_are_violated_where_hard_pins_are_kept(two_clips):
     assert hard.total_cost > soft.total_cost
     dear = find_path(two_clips, beat_s, costs=NO_USAGE, starts=np.array([0]), interval_price=np.where(mask, 0.0, 9.0))
     assert clips(dear) == {0, 1}
+
+
+@pytest.fixture
+def one_way(make_graph):
+    """One clip of 21 beats at the song's pace, from its first beat: interval k can be danced from node k alone."""
+    beat_s = np.arange(21) * 0.5
+    return reach_of(make_graph([beat_s]), beat_s, np.array([0]))
+
+
+def shown_at(*intervals):
+    nodes = np.zeros(21, bool)
+    nodes[list(intervals)] = True
+    return nodes
+
+
+def shifts(reach, pins, choices=None):
+    return [
+        (way.pin_index, way.shift_beats, way.choice) for way in find_conflict(reach, pins, choices=choices).ways_out
+    ]
+
+
+@pytest.mark.parametrize(
+    ("wanted", "shift"),
+    [
+        ((3, 7), 1),  # the nearest, not the earliest
+        ((5, 9), -1),
+        ((5, 7), -1),  # of two as near the earlier
+        ((19,), 13),  # the last interval of the song
+        ((0,), -6),  # its first
+    ],
+)
+def test_a_way_out_goes_to_the_nearest_beat(one_way, wanted, shift):
+    assert shifts(one_way, [Pin("p", 6, 7, shown_at(*wanted))]) == [(0, shift, "")]
+
+
+def test_a_long_pin_may_end_with_the_song_and_not_after_it(one_way):
+    assert shifts(one_way, [Pin("p", 15, 18, shown_at(17, 18, 19))]) == [(0, 2, "")]
+    assert shifts(one_way, [Pin("p", 15, 18, shown_at(18, 19, 20))]) == []
+
+
+def test_a_way_out_is_no_further_than_sixteen_beats(one_way):
+    assert shifts(one_way, [Pin("p", 17, 18, shown_at(1))]) == [(0, -16, "")]
+    assert shifts(one_way, [Pin("p", 18, 19, shown_at(1))]) == []
+
+
+def test_the_first_choice_that_does_is_named_after_the_shifts(one_way):
+    wish = shown_at(8)
+    choices = [{"same again": wish, "neither": shown_at(2), "this": shown_at(6, 7), "that too": shown_at(6)}]
+    assert shifts(one_way, [Pin("p", 6, 7, wish)], choices) == [(0, 2, ""), (0, 0, "this")]
+    assert shifts(one_way, [Pin("p", 6, 7, np.zeros(21, bool))], choices) == [(0, 0, "this")]
+
+
+def test_of_two_conflicts_the_ways_out_mend_the_first_alone(one_way):
+    pins = [Pin("a", 6, 7, shown_at(7)), Pin("b", 2, 3, shown_at(4))]
+    conflict = find_conflict(one_way, pins)
+    assert (conflict.pin_index, conflict.has_more) == ((0,), True)
+    assert [(way.pin_index, way.shift_beats) for way in conflict.ways_out] == [(0, 1)]
+
+
+def test_a_way_out_keeps_the_other_pins(one_way):
+    """One beat on would do for the pin by itself, were it not for the other pin that forbids what is shown there."""
+    other = Pin("other", 7, 8, shown_at(7))
+    moved = Pin("p", 6, 7, shown_at(7, 9), steps_at=None)
+    assert shifts(one_way, [moved, other]) == [(0, 1, "")]
+    beat_s = np.arange(21) * 0.5
+    assert one_way.keeps([moved.moved(1), other])
+    assert one_way.n_intervals == len(beat_s) - 1
+
+
+def test_ways_out_of_several_pins_are_nearest_first_and_choices_last(make_graph):
+    """Two clips without a way between them: each pin wants one clip, or a moment of the other a little later."""
+    beats = np.arange(9) * 0.5
+    graph = make_graph([beats, beats])
+    reach = reach_of(graph, beats, np.array([0, 9]))
+    first, second = graph.clip_index == 0, graph.clip_index == 1
+    a, b = first.copy(), second.copy()
+    a[9 + 4] = b[6] = True
+    conflict = find_conflict(
+        reach, [Pin("a", 2, 3, a), Pin("b", 5, 6, b)], choices=[{"second": second}, {"first": first}]
+    )
+    assert (conflict.pin_index, conflict.reason) == ((0, 1), "path")
+    assert [(way.pin_index, way.shift_beats, way.choice) for way in conflict.ways_out] == [
+        (1, 1, ""),
+        (0, 2, ""),
+        (0, 0, "second"),
+        (1, 0, "first"),
+    ]
+
+
+def test_a_moved_pin_takes_the_steps_of_its_new_beat(make_graph):
+    graph = make_graph([np.arange(8) * 0.5])
+    near = np.where(np.arange(8) == 3, 0.0, np.inf)
+    everything = np.ones(8, bool)
+
+    def at(beat):
+        return pose_steps(graph, beat, near, 7)
+
+    reach = reach_of(graph, np.arange(8) * 0.5, np.array([0]))
+    pin = Pin("pose", 2, 3, everything, at(2), at)
+    assert [way.shift_beats for way in find_conflict(reach, [pin]).ways_out] == [1]
+    assert set(pin.moved(1).steps) == set(at(3))
+    assert pin.moved(1).moved(-1).steps.keys() == pin.steps.keys()
+    assert pin.instead(everything).steps == {}
+
+
+def test_pins_keep_the_hard_bounds_wherever_the_song_does(make_graph):
+    """A clip far from the tempo beside one in tempo is no way to keep a pin; alone it is danced at the last resort."""
+    beat_s = np.arange(9) * 0.5
+    both = make_graph([beat_s, 0.36 * np.arange(12)])
+    reach = reach_of(both, beat_s)
+    assert reach.bounds == NO_USAGE.hard_ratio
+    assert not reach.keeps([Pin("far", 2, 3, both.clip_index == 1)])
+    alone = make_graph([0.36 * np.arange(12)])
+    last_resort = reach_of(alone, beat_s)
+    assert last_resort.bounds == NO_USAGE.last_resort_ratio
+    assert last_resort.keeps([Pin("far", 2, 3, np.ones(12, bool))])
+
+
+def test_a_half_time_pin_covers_both_of_its_beats(make_graph):
+    """Whether a pin's tempo fits is asked of every step that covers the interval, from before it too."""
+    graph = make_graph([np.arange(6) * 1.0])
+    reach = reach_of(graph, np.arange(9) * 0.5)
+    for interval in range(8):
+        assert reach.fits(Pin("p", interval, interval + 1, np.ones(6, bool)))
+    assert not reach.fits(Pin("p", 0, 1, np.arange(6) == 5))
