@@ -257,3 +257,13 @@ def test_a_leg_gives_no_more_than_half_of_what_it_has_left_to_stretch():
     near = _within_reach(position, np.full((1, 2, 1), 0.001) * down, 0.5)
     np.testing.assert_allclose(near[..., 1], -0.001, atol=1e-4)
     np.testing.assert_allclose(_within_reach(position, np.full((1, 2, 1), -0.1) * down, 0.5)[..., 1], 0.1, atol=1e-9)
+
+
+@pytest.mark.parametrize("bend_rad", [0.05, 0.2])
+def test_a_knee_does_not_pop_where_one_planted_foot_is_pulled_far(bend_rad):
+    mixed, planted = held_apart(0.5, bend_rad=bend_rad)
+    one = planted.ankle.copy()
+    one[:, 1] = False
+    held = lock_feet(mixed, replace(planted, ankle=one, toes=one))
+    change = np.diff(knee_angles(held.position_xyz_m), n=2, axis=0)
+    assert np.abs(change).max() < 0.015
