@@ -57,3 +57,12 @@ def test_a_floor_out_of_reach_leaves_nothing(program, clips, segments):
     stages = stages_of(program, clips, segments, PLANS[0])
     pairs, _ = finalists(stages, k=1, floor=np.full(2, 1e6, np.float32))
     assert len(pairs) == 0
+
+
+@pytest.mark.parametrize("plan", [BRUTE, PLANS[0]], ids=str)
+def test_every_finalist_has_the_best_score_of_its_own_pair(program, clips, segments, plan):
+    stages = stages_of(program, clips, segments, plan)
+    pairs, score = finalists(stages, k=3, floor=np.full(2, -1, np.float32))
+    assert sorted(map(tuple, pairs.tolist())) == [(s, c) for s in range(2) for c in range(3)]
+    expected = [np.ldexp(best_of(segments[s], clips[c]), -stages.tables.exponent) for s, c in pairs.tolist()]
+    np.testing.assert_allclose(score, expected, rtol=1e-5)

@@ -66,6 +66,27 @@ def test_best_and_emitted_candidates(program, clips, segments, by_level):
     assert stages.emit(pairs, np.full(2, -1, np.float32), most=3) is None
 
 
+def test_answers_stay_where_groups_outgrow_their_room(program, clips, segments, monkeypatch):
+    pairs = np.array([[0, 0], [1, 2], [1, 0]], np.int32)
+    none = np.full(3, -1, np.float32)
+    expected = stages_of(program, clips, segments, PLANS[0]).best(pairs, none)
+    monkeypatch.setattr("kernels.opencl.match_stages._LEVEL_BYTES", 16)  # two groups
+    stages = stages_of(program, clips, segments, PLANS[0], by_level=True)
+    np.testing.assert_array_equal(stages.best(pairs, none), expected)
+    assert stages.emit(pairs, none, most=10**6) is None
+    one = stages.emit(pairs[:1], expected[:1], most=1)
+    assert set(one.pair.tolist()) == {0}
+    assert len(one.pair) >= 1
+
+
+def test_nothing_is_listed_for_no_pairs(program, clips, segments):
+    for by_level in (False, True):
+        stages = stages_of(program, clips, segments, PLANS[0], by_level)
+        none = np.zeros((0, 2), np.int32), np.zeros(0, np.float32)
+        assert stages.best(*none).shape == (0,)
+        assert len(stages.emit(*none, most=1).pair) == 0
+
+
 def test_places_and_sizes(program, clips):
     tables = Tables(program, clips, numerators=SCALE_NUMERATORS)
     assert SCALE_BITS == 24

@@ -63,3 +63,13 @@ def test_memory_is_what_the_formula_says(program, clips):
     before = tables.n_bytes
     tables.build(Plan((25, 8), (10, 8), (5,)))
     assert tables.n_bytes == before
+
+
+def test_memory_is_that_of_the_buffers(program, clips):
+    plan = Plan((25, 8), (10, 8), (5,))
+    tables = Tables(program, clips, numerators=SCALE_NUMERATORS)
+    held = [tables.frame, tables.clip_first, tables.clip_stride, tables.clip_frames]
+    assert tables.n_bytes == sum(buffer.size for buffer in held)
+    tables.build(plan)
+    held += [tables.folded(*entry) for entry in plan.folded] + [tables.dense(g) for g in plan.dense]
+    assert tables.n_bytes == sum(buffer.size for buffer in held)
