@@ -1,5 +1,6 @@
 """Reading sessions within the studio's limits."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 from assets.capture import _Reader
 from assets.formats import bvh
 from assets.formats.clips_csv import Facts
-from assets.sources.sources import ClipFile
+from assets.sources.sources import ClipFile, session_version
 from assets.stamps import Stamp
 from kernels.synthetic.dancer import take
 from pipelines.resources import NoProgress
@@ -118,7 +119,8 @@ def test_what_the_disk_refused_is_never_taken_for_fresh(tmp_path, read_as):
     assert parts["clip"].clips == {}
     again = _Reader(studio, SimpleNamespace(), Stored(**parts), NoProgress(), "1").read("s", (clip,))
     assert again["pose"].metadata["computed_clips"] == 1
-    assert parts["pose"].sources != stored["pose"].sources
+    assert stored["pose"].sources == session_version((replace(clip, path="step.bvh", sha256="one"),))
+    assert parts["pose"].sources != session_version((clip,))
 
 
 def test_a_clip_refused_by_its_folder_is_not_opened(tmp_path):

@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.motion.beats import BeatSettings, component_curve, find_extrema, motion_beats, smooth
+from kernels.motion.beats import (
+    BeatSettings,
+    _autocorrelation_interval_s,
+    _cosines,
+    _refine,
+    _spectral_peak,
+    component_curve,
+    find_extrema,
+    motion_beats,
+    smooth,
+)
 from kernels.synthetic.dancer import MOVES, place, take
 
 FRAME_S = 1 / 30
@@ -66,6 +76,131 @@ def test_bounce_beats_where_it_is_stopped_not_where_it_is_let_go():
     beats = motion_beats(position, 30.0)
     assert beats.interval_s == pytest.approx(0.5, rel=0.02)
     assert worst_error_s(beats, 0.5, 0.1) <= FRAME_S
+
+
+def bounce(interval_s, duration_s=8.0):
+    """Two joints that are stopped sharply on the beat, and turn round between."""
+    t = np.arange(round(duration_s * 60)) / 60
+    position = np.zeros((len(t), 3, 3))
+    position[:, 1:, 1] -= 0.3 * np.abs(np.sin(np.pi * (t - 0.1) / interval_s))[:, None]
+    return position
+
+
+def test_steps_faster_than_a_dancers_are_taken_two_to_a_beat():
+    assert motion_beats(swing(interval_s=0.26, rate_hz=60.0), 60.0).interval_s == pytest.approx(0.52, rel=0.02)
+    assert motion_beats(swing(interval_s=0.3, rate_hz=60.0), 60.0).interval_s == pytest.approx(0.3, rel=0.02)
+
+
+def test_but_not_where_two_would_be_longer_than_the_longest_beat():
+    short = BeatSettings(longest_s=0.5)
+    found = motion_beats(swing(interval_s=0.26, rate_hz=60.0), 60.0, settings=short)
+    assert found.interval_s == pytest.approx(0.26, rel=0.02)
+
+
+def test_a_slow_bounce_turns_on_beats():
+    """Slower than 0.45 s a turn, each turn is a beat however sharp it is."""
+    assert motion_beats(bounce(0.8), 60.0).interval_s == pytest.approx(0.8, rel=0.02)
+    assert motion_beats(bounce(1.0), 60.0).interval_s == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_beat_is_no_longer_than_its_bound():
+    position = swing(interval_s=0.5)
+    one = {"extrema_per_beat": 1}
+    assert len(motion_beats(position, 30.0, settings=BeatSettings(longest_s=0.4, **one)).time_s) == 0
+    assert BeatSettings(shortest_s=0.3, **one).shortest_extremum_s == 0.3
+    assert BeatSettings(shortest_s=0.3).shortest_extremum_s == 0.15
+
+
+def test_travel_is_a_mean_over_joints():
+    """Ten joints that move by 4 mm stand still, however much that is together; by 6 mm they move."""
+    t = np.arange(240) / 30
+    for size_m, moves in ((0.004, False), (0.006, True)):
+        position = np.zeros((240, 11, 3))
+        position[:, 1:, 0] = size_m * np.sqrt(2) * np.cos(2 * np.pi * t)[:, None]
+        assert bool(len(motion_beats(position, 30.0).time_s)) == moves
+
+
+def test_turns_fewer_than_three_are_no_beats():
+    t = np.arange(60) / 30
+    position = np.zeros((60, 2, 3))
+    position[:, 1, 0] = np.sin(0.9 * np.pi * t)
+    assert len(find_extrema(position[:, 1, 0], 30.0)) == 2
+    assert len(motion_beats(position, 30.0).time_s) == 0
+
+
+def test_one_period_of_a_cosine_lies_between_neighbouring_turns_and_nothing_outside():
+    found = _cosines(np.array([2.0, 6.0, 8.0]), 11)
+    np.testing.assert_allclose(found, [0, 0, 1, 0, -1, 0, 1, -1, 1, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("hz", [1.0, 2.0 + 0.5 * 30 / 4096, 3.7])
+def test_the_strongest_frequency_is_found_between_those_of_the_transform(hz):
+    series = np.cos(2 * np.pi * hz * np.arange(240) / 30)
+    found, share = _spectral_peak(series, 30.0, BeatSettings())
+    assert found == pytest.approx(hz, abs=5e-4)
+    assert share > 0.99
+
+
+def test_the_share_of_the_peak_falls_with_what_else_there_is():
+    t = np.arange(600) / 30
+    both = np.cos(2 * np.pi * 1.5 * t) + 0.5 * np.cos(2 * np.pi * 4.0 * t)
+    _, share = _spectral_peak(both, 30.0, BeatSettings())
+    assert share == pytest.approx(0.8, abs=0.01)
+
+
+def test_a_curve_that_never_repeats_itself_has_no_interval():
+    assert _autocorrelation_interval_s(np.arange(300.0) ** 2, 30.0, BeatSettings()) == 0.0
+
+
+def test_of_lags_that_fit_about_as_well_the_shortest_counts():
+    t = np.arange(360) / 30
+    swell = np.cos(2 * np.pi * t) * (1 + 0.1 * np.cos(np.pi * t))  # every second swing a little larger
+    assert _autocorrelation_interval_s(swell, 30.0, BeatSettings()) == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_grid_is_fitted_to_the_turns_near_it():
+    turn_s = 0.3 + 0.52 * np.arange(12)
+    strays = np.sort(np.append(turn_s, [1.6, 4.2]))  # two turns between beats
+    np.testing.assert_allclose(_refine(strays, 0.5, 0.25)[0], 0.52, rtol=1e-6)
+    assert _refine(np.zeros(0), 0.5, 0.1) == (0.5, 0.1)
+    assert _refine(np.array([0.1, 0.63]), 0.5, 0.1)[0] == 0.5  # two turns tell no better
+
+
+def test_the_first_window_says_which_way_is_up():
+    position = swing()
+    relative = (position - position[:, :1]).reshape(len(position), -1)
+    up, _ = component_curve(relative, 60, 1)
+    down, _ = component_curve(-relative, 60, 1)
+    np.testing.assert_allclose(down, -up, atol=1e-9)
+    assert (up * relative[:, 12]).sum() > 0  # the coordinate that moves most rises where the curve does
+
+
+def test_a_component_beyond_the_last_is_the_last():
+    relative = np.random.default_rng(0).normal(size=(40, 2))
+    one, other = (component_curve(relative, 20, k) for k in (2, 7))
+    np.testing.assert_array_equal(one[0], other[0])
+    assert one[1] == other[1]
+
+
+def test_what_does_not_move_has_no_share():
+    curve, share = component_curve(np.ones((30, 3)), 10, 1)
+    assert share == 0
+    assert not curve.any()
+
+
+def test_a_curve_too_short_or_too_slowly_sampled_is_not_smoothed():
+    rough = np.array([0.0, 1.0, 0.0, 1.0])
+    np.testing.assert_array_equal(smooth(rough, 30.0, 5.0), rough)
+    longer = np.tile(rough, 10)
+    np.testing.assert_array_equal(smooth(longer, 11.0, 5.0), longer)  # 5 Hz is more than 0.45 of it
+    assert np.abs(smooth(longer, 12.0, 5.0) - longer).max() > 0.01
+
+
+def test_tremor_beside_great_turns_is_none():
+    t = np.arange(240) / 30
+    curve = np.cos(2 * np.pi * 0.5 * t) + 0.05 * np.cos(2 * np.pi * 6 * t)
+    assert len(find_extrema(curve, 30.0)) == pytest.approx(8, abs=1)
+    assert len(find_extrema(np.ones(50), 30.0)) == len(find_extrema(curve[:4], 30.0)) == 0
 
 
 def test_turning_dancer_needs_to_be_seen_from_the_body():

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from kernels.motion.velocity import accents, jerk, jerk_around, kinematic_beats, mean_speed, speed_between
+from kernels.motion.velocity import (
+    accents,
+    jerk,
+    jerk_around,
+    kinematic_beats,
+    mean_speed,
+    speed_between,
+    usable_frames,
+)
 
 
 @pytest.fixture
@@ -116,3 +124,107 @@ def test_speed_between_moments_of_a_body_that_speeds_up():
     np.testing.assert_allclose(found, [0.5, 1.5, 3.0, 3.0], atol=0.03)
     assert len(speed_between(position, 30.0, time_s=np.zeros(0))) == 0
     assert speed_between(position, 30.0, time_s=np.array([1.0]))[0] == pytest.approx(2.0, abs=0.03)
+
+
+def line(*step_m, n=40, usual_m=0.0):
+    """Two joints of which one goes so far each frame, at first as said and then as usual, (n, 2, 3)."""
+    position = np.zeros((n, 2, 3))
+    step = np.full(n - 1, usual_m)
+    step[: len(step_m)] = step_m
+    position[1:, 1, 0] = np.cumsum(step)
+    return position
+
+
+def test_a_pose_before_the_take_and_one_after_it_are_left_out():
+    assert usable_frames(line(1.0), 30.0) == (1, 39)
+    assert usable_frames(line(0.0, 0.0, 1.0), 30.0) == (3, 39)
+    assert usable_frames(line(1.0, 0.0, 1.0), 30.0) == (3, 39)
+    assert usable_frames(line(1.0)[::-1], 30.0) == (0, 38)
+    assert usable_frames(line(0.0, 0.0, 1.0)[::-1], 30.0) == (0, 36)
+    assert usable_frames(line(1.0, 0.0, 1.0)[::-1], 30.0) == (0, 36)
+
+
+def test_a_jump_further_in_is_part_of_the_take():
+    assert usable_frames(line(0.0, 0.0, 0.0, 1.0), 30.0) == (0, 39)
+    assert usable_frames(line(0.0, 0.0, 0.0, 1.0)[::-1], 30.0) == (0, 39)
+
+
+def test_a_jump_is_faster_than_8_m_a_second_and_than_four_times_the_usual():
+    assert usable_frames(line(7.9 / 30), 30.0) == (0, 39)
+    assert usable_frames(line(8.1 / 30), 30.0) == (1, 39)
+    assert usable_frames(line(11.9 / 30, usual_m=3 / 30), 30.0) == (0, 39)
+    assert usable_frames(line(12.1 / 30, usual_m=3 / 30), 30.0) == (1, 39)
+
+
+@pytest.mark.parametrize("n", [0, 1, 11, 12])
+def test_a_clip_of_fewer_than_twelve_frames_is_used_whole(n):
+    assert usable_frames(line(n=12)[:n], 30.0) == (0, max(n - 1, 0))
+
+
+def moving(*speed_m_per_s):
+    """One joint whose central differences are these speeds at one frame a second, but for the ends."""
+    position = np.zeros((len(speed_m_per_s) + 1, 1, 3))
+    position[1:, 0, 0] = np.cumsum(speed_m_per_s)
+    return position
+
+
+def test_of_equal_lowest_speeds_the_first_is_the_beat():
+    found = kinematic_beats(moving(4, 4, 1, 1, 1, 4, 4), 1.0, smoothing_s=0.0)
+    np.testing.assert_array_equal(found, [3])
+    assert len(kinematic_beats(moving(4, 1), 1.0, smoothing_s=0.0)) == 0
+
+
+def test_the_drop_of_a_stop_is_from_the_mean_of_the_peaks_beside_it():
+    t = np.arange(360) / 60
+    position = np.zeros((360, 1, 3))
+    # slow before the stop at 3 s and fast after it
+    position[:, 0, 0] = np.where(t < 3, 0.05, 0.3) * np.cos(np.pi * (t - 3))
+    position[t < 3, 0, 0] += 0.25
+    speed = mean_speed(position, 60.0)
+    stop = int(kinematic_beats(position, 60.0)[np.argmin(np.abs(kinematic_beats(position, 60.0) - 180))])
+    beside = [k for k in kinematic_beats(position, 60.0) if k != stop]
+    before = speed[max([k for k in beside if k < stop], default=0) : stop].max()
+    after = speed[stop : min([k for k in beside if k > stop], default=360)].max()
+    assert after > 3 * before
+    drop = (before + after) / 2 - speed[stop]
+    for half in (0.05, 0.5):
+        got = accents(position, 60.0, time_s=np.array([stop / 60]), half_drop_m_per_s=half)[0]
+        assert got == pytest.approx(drop / (drop + half), rel=1e-6)
+
+
+def test_jerk_is_that_of_the_joint_that_jerks_most():
+    t = np.arange(30) / 30
+    position = np.zeros((30, 3, 3))
+    position[:, 1, 1] = 5 * t**3
+    position[:, 2, 1] = 2 * t**3
+    np.testing.assert_allclose(jerk(position, 30.0)[1:-2], 30.0, rtol=1e-6)
+    peak, usual = jerk_around(position, 30.0, time_s=np.array([0.5]))
+    assert peak[0] == pytest.approx(30.0, rel=1e-6)
+    assert usual == pytest.approx(30.0, rel=1e-6)
+
+
+def test_jerk_around_reaches_as_far_on_either_side_and_usually_is_its_99th_percentile():
+    position = np.zeros((1000, 1, 3))
+    position[500:, 0, 0] = 0.1  # a jump of the positions between 499 and 500
+    at = 499.5 / 30
+    for reach_s, apart_s, is_seen in ((0.3, 0.2, True), (0.3, 0.4, False)):
+        for moment in (at - apart_s, at + apart_s):
+            peak, usual = jerk_around(position, 30.0, time_s=np.array([moment]), reach_s=reach_s)
+            assert (peak[0] > 0) == is_seen
+            assert usual == 0  # three of a thousand
+
+
+def test_a_slow_recording_is_looked_at_frame_by_frame():
+    t = np.arange(40) / 10
+    position = np.zeros((40, 1, 3))
+    position[:, 0, 0] = t**3
+    peak, usual = jerk_around(position, 10.0, time_s=np.array([2.0]))
+    np.testing.assert_allclose([peak[0], usual], 6.0, rtol=1e-6)
+
+
+def test_moments_in_one_frame_and_beyond_the_clip_have_the_speed_there():
+    position = moving(1, 1, 1, 5, 5, 5)
+    found = speed_between(position, 1.0, time_s=np.array([1.0, 1.2, 1.4]))
+    np.testing.assert_allclose(found, 1.0)
+    np.testing.assert_allclose(speed_between(position, 1.0, time_s=np.array([0.0, 99.0])), 16 / 6)
+    np.testing.assert_allclose(speed_between(position, 1.0, time_s=np.array([50.0, 99.0])), 5.0)
