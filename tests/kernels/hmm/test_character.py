@@ -76,3 +76,17 @@ def test_chance_by_hand():
     assert chance_of(3, 3) == pytest.approx(1 / 8)
     assert chance_of(0, 5) == 1.0
     assert chance_of(2, 2, n_dancers=4) == pytest.approx(1 / 16)
+
+
+def test_of_equal_likenesses_and_votes_the_first_counts():
+    one = dancer(hidden_rules(seed=4), 1)
+    assert identify(np.array([0, 1, 2]), [one, one]) == 0
+    here, there = np.zeros((1, 2)), np.ones((1, 2))
+    assert nearest_dancer(np.array([[0.0, 0.0], [1.0, 1.0]]), [here, there]) == 0
+    assert nearest_dancer(np.array([[0.0, 0.0], [1.0, 1.0], [1.0, 1.0]]), [here, there]) == 1
+
+
+@pytest.mark.parametrize(("seconds", "n"), [(0.5, 1), (2.0, 1), (2.9, 1), (3.0, 2), (5.0, 4)])
+def test_a_stretch_every_second_and_one_of_what_is_shorter(seconds, n):
+    position = np.random.default_rng(0).normal(size=(round(seconds * 30) + 1, 22, 3))
+    assert len(pose_windows(position, 30.0)) == n

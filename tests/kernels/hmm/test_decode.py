@@ -116,3 +116,31 @@ def test_showing_the_same_again_is_priced(monkeypatch, some_motions):
     free = decode_varied(motions, links, places, np.zeros(1), zero, repetition_weight=0.0, **asked)
     assert free.motion.tolist() == [0, 1, 0, 1]
     assert free.start.tolist() == [0, 1, 2, 3]
+
+
+def test_a_motion_shown_very_often_costs_no_more(monkeypatch):
+    """A repeated motion is left for another only while its price still rises."""
+    monkeypatch.setattr(decoding, "WINDOW", 1)
+    monkeypatch.setattr(decoding, "LOOK_AHEAD", 0)
+    motions = Motions(np.arange(2), np.zeros(2, np.int64), np.zeros(2), np.full(2, 0.5))
+    n = 12
+    places = place(
+        motions, 0.5 * np.arange(n + 1), np.zeros((n, 1)), longest=1, is_beat=np.zeros(n + 1, bool), accent=np.ones(2)
+    )
+    none = Links(np.zeros(3, np.int64), np.zeros(0, np.int64), np.zeros(0), np.zeros(0, bool))
+
+    def shown(dearer):
+        found = decode_varied(
+            motions,
+            none,
+            places,
+            np.zeros(1),
+            np.zeros((1, 1)),
+            price=np.array([0.0, dearer]),
+            crowded=np.zeros(n + 1),
+            repetition_weight=1.0,
+        )
+        return found.motion.tolist()
+
+    assert shown(0.9)[:5] == [0, 0, 0, 0, 1]
+    assert shown(1.1) == [0] * n  # four showings are the most that is priced

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.hmm.durations import HARD_LOG, log_durations, parts_per_beat, subdivide
+from kernels.hmm.durations import HARD_LOG, WIDTH, log_durations, parts_per_beat, subdivide
 
 
 def test_a_motion_of_two_beats_takes_two():
@@ -40,3 +40,25 @@ def test_slow_beats_are_cut(beat_s, parts):
 
 def test_cut_evenly():
     np.testing.assert_allclose(subdivide(np.array([0.0, 1.0, 3.0]), 2), [0, 0.5, 1, 2, 3])
+
+
+def test_a_length_beyond_the_easy_bounds_counts_so_much_less_and_beyond_the_hard_ones_not_at_all():
+    span = np.array([0.79, 0.81, 0.89, 0.91, 1.09, 1.11, 1.24, 1.26])
+    found = np.array([log_durations(np.array([0.0, s]), [np.ones(1)], longest=1)[0, 0, 0] for s in span])
+    bump = -0.5 * (np.log(span) / WIDTH) ** 2
+    np.testing.assert_allclose(found[[3, 4]], bump[[3, 4]], atol=0.02)
+    np.testing.assert_allclose(found[[1, 2, 5, 6]], bump[[1, 2, 5, 6]] + HARD_LOG, atol=0.1)
+    assert np.isneginf(found[[0, 7]]).all()
+
+
+def test_over_all_lengths_probabilities_sum_to_no_more_than_one():
+    grid = np.cumsum(np.random.default_rng(0).uniform(0.3, 0.6, 20))
+    lengths = [np.array([0.4, 0.9, 1.4]), np.array([0.45])]
+    total = np.exp(log_durations(grid, lengths, longest=5)).sum(axis=1)
+    assert (total <= 1 + 1e-9).all()
+    assert total.max() > 0.9
+
+
+def test_a_beat_is_cut_by_the_median_length():
+    assert parts_per_beat(1.0, np.array([0.5, 0.5, 9.0])) == 2
+    assert parts_per_beat(1.0, np.array([0.4, 0.6])) == 2

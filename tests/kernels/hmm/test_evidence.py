@@ -1,9 +1,11 @@
 """Evidence for music: there where it is, none where there is none, and slow change alone is no proof."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from kernels.hmm.evidence import Evidence, measure, shuffled_order
+from kernels.hmm.evidence import Evidence, measure, predicted, shuffled_order
 from kernels.hmm.model import Performed, Smoothing, choose_smoothing
 from kernels.synthetic.performance import DRUM_KEYS, draw_notes, draw_states, hidden_rules
 
@@ -67,3 +69,34 @@ def test_too_little_to_hold_out_is_no_evidence(state):
     assert isinstance(one, Evidence)
     assert not one.music_adds
     assert measure([], 2, [3], smoothing=Smoothing(1.0, (1.0,))).gain == 0.0
+
+
+def test_gain_weighs_performances_by_what_was_predicted_and_passes_over_the_others():
+    nan = np.nan
+    one = Evidence(np.array([-1.0, -2.0, nan]), np.array([-2.0, -2.5, nan]), np.zeros(3), np.array([30, 10, 0]), 0.005)
+    assert one.gain == pytest.approx(0.75 * 1.0 + 0.25 * 0.5)
+    assert one.music_adds
+
+
+@pytest.mark.parametrize(("gain", "p", "adds"), [(0.01, 0.009, True), (0.009, 0.005, False), (0.5, 0.01, False)])
+def test_music_adds_only_where_it_gains_and_chance_is_small(gain, p, adds):
+    one = Evidence(np.array([gain]), np.zeros(1), np.zeros(1), np.ones(1, np.int64), p)
+    assert one.music_adds == adds
+
+
+def test_the_music_itself_counts_among_the_shuffles():
+    found = measure([performance(0.9, n=400)], 8, [12], smoothing=Smoothing(0.1, (0.1,)), n_shuffles=4)
+    assert found.p == pytest.approx(1 / 5)
+
+
+def test_motions_are_predicted_from_the_one_before_with_their_music():
+    log = np.log(np.array([[0.5, 0.5], [0.2, 0.8]]))
+    model = SimpleNamespace(log_transition=log)
+    state, at = np.array([1, 0, 1]), np.array([1, 2])
+    silent = np.zeros((2, 2))
+    assert predicted(model, state, at, silent) == pytest.approx(np.log(0.2) + np.log(0.5))
+    loud = np.log(np.array([[0.9, 0.1], [0.3, 0.7]]))
+    wanted = 0.2 * 0.9 / (0.2 * 0.9 + 0.8 * 0.1), 0.5 * 0.7 / (0.5 * 0.3 + 0.5 * 0.7)
+    assert predicted(model, state, at, loud) == pytest.approx(np.log(wanted).sum())
+    far = predicted(model, state, at, loud - 1e4)  # however small the likelihoods are
+    assert far == pytest.approx(np.log(wanted).sum())

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from kernels.hmm.instances import Motions, warp_cost
 from kernels.hmm.places import (
     CROWDED,
     MISSED_BEAT,
@@ -12,6 +13,7 @@ from kernels.hmm.places import (
     finishing,
     keep_wishes,
     missed_beats,
+    place,
 )
 from kernels.hmm.viterbi import InfeasibleSpansError
 
@@ -48,3 +50,43 @@ def test_what_nothing_can_follow_is_taken_out():
     with pytest.raises(InfeasibleSpansError) as told:
         finishing(Places([[one, one], [none, none], [none, none]]))
     assert told.value.interval == 2
+
+
+def test_a_motion_stands_where_its_pace_is_within_the_hard_bounds():
+    length = np.array([0.39, 0.4, 0.5, 0.625, 0.63])
+    n = len(length)
+    motions = Motions(np.arange(n), np.zeros(n, np.int64), np.zeros(n), length)
+    grid, none = 0.5 * np.arange(3), np.zeros(3, bool)
+    places = place(motions, grid, np.zeros((1, 1)), longest=2, is_beat=none, accent=np.zeros(n))
+    assert places.at[0][0][0].tolist() == [1, 2, 3]
+    np.testing.assert_allclose(places.at[0][0][1], warp_cost(np.array(0.5), length[1:4]))
+    assert places.at[0][1][0].tolist() == []
+    light = place(motions, grid, np.zeros((1, 1)), longest=1, is_beat=none, accent=np.zeros(n), warp_weight=0.5)
+    np.testing.assert_allclose(light.at[0][0][1], 0.5 * warp_cost(np.array(0.5), length[1:4]))
+
+
+def test_a_place_pays_for_beats_passed_and_for_the_music_under_it_as_far_as_the_song_goes():
+    motions = Motions(np.zeros(1, np.int64), np.array([1]), np.zeros(1), np.ones(1))
+    grid, is_beat = 0.5 * np.arange(4), np.array([True, True, True, False])
+    log_music = np.array([[0.0, -1.0], [0.0, -3.0]])
+    places = place(motions, grid, log_music, longest=2, is_beat=is_beat, accent=np.array([0.25]))
+    assert places.at[0][1][1] == pytest.approx([MISSED_BEAT * (1 + 0.75) + 1 + 3])
+    assert places.at[1][1][1] == pytest.approx([MISSED_BEAT + 3])  # ends past the last interval, on no beat
+
+
+def test_where_wishes_overlap_each_counts_and_a_hard_one_closes(some_motions, places_of):
+    motions = some_motions()
+    places = places_of(motions)
+    low, even = np.arange(6) < 3, np.arange(6) % 2 == 0
+    both = keep_wishes(places, [MotionWish(0, 4, low), MotionWish(0, 4, even)], price=0.5)
+    fits, cost = places.at[0][1]
+    wanted = cost + 0.5 * 2 * (~low[fits]).astype(float) + 0.5 * 2 * (~even[fits]).astype(float)
+    np.testing.assert_allclose(both.at[0][1][1], wanted)
+    closed = keep_wishes(places, [MotionWish(0, 4, low), MotionWish(0, 4, even)])
+    assert set(closed.at[0][1][0].tolist()) == {0, 2}
+
+
+def test_a_wish_counts_the_intervals_that_a_motion_shares_with_it():
+    wish = MotionWish(2, 5, np.ones(1, bool))
+    found = wish.touched_by(np.array([0, 0, 1, 2, 4, 5]), np.array([2, 3, 9, 1, 4, 1]))
+    assert found.tolist() == [0, 1, 3, 1, 1, 0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.hmm.states import States, assign, clearness, cluster, k_means, squared_distances
+from kernels.hmm.states import States, _chosen, assign, clearness, cluster, k_means, squared_distances
 
 
 def kinds(n_kinds=5, n_each=40, spread=0.1, seed=0):
@@ -87,3 +87,39 @@ def test_what_cannot_be_clustered_is_refused():
         cluster(np.full((3, 3), np.nan))
     with pytest.raises(ValueError, match="n_states"):
         cluster(np.zeros((3, 3)), n_states=-1)
+
+
+def test_of_clear_numbers_the_largest_that_is_almost_as_clear_is_chosen():
+    assert _chosen(((2, 0.9), (3, 0.88), (4, 0.87), (5, 0.75))) == 3
+    assert _chosen(((2, 0.9), (3, 0.5))) == 2
+
+
+def test_where_no_number_is_clear_the_largest_that_is_clear_enough_beside_the_clearest_is():
+    assert _chosen(((2, 0.6), (3, 0.5), (4, 0.43), (5, 0.41))) == 4
+    assert _chosen(((1, 0.0),)) == 1
+
+
+def test_no_more_states_are_tried_than_leave_twelve_motions_to_each():
+    blur = np.random.default_rng(0).normal(size=(47, 3))
+    assert [k for k, _ in cluster(blur).tried] == [2, 3]
+    assert [k for k, _ in cluster(np.append(blur, blur[:1] + 1, axis=0)).tried] == [2, 3, 4]
+
+
+def test_a_motion_not_clustered_belongs_within_one_and_a_half_times_the_reach():
+    states = States(np.zeros((1, 2)), np.array([2.0]), np.array([9]))
+    label, apart = assign(np.array([[2.99, 0.0], [3.01, 0.0]]), states)
+    assert label.tolist() == [0, -1]
+    np.testing.assert_allclose(apart, [2.99, 3.01])
+
+
+def test_a_state_reaches_to_the_95th_percentile_of_its_motions():
+    points = np.concatenate([np.linspace(-1, 1, 41)[:, None] * [[1.0, 0.0]]])
+    found = cluster(points, n_states=1)
+    assert found.reach[0] == pytest.approx(np.percentile(np.abs(points[:, 0]), 95))
+
+
+def test_states_of_as_many_motions_stand_in_the_order_of_their_centroids():
+    points = np.repeat([[5.0, 0.0], [-5.0, 1.0], [-5.0, -1.0]], 20, axis=0)
+    found = cluster(points + 1e-3 * np.random.default_rng(0).normal(size=points.shape), n_states=3)
+    assert found.count.tolist() == [20, 20, 20]
+    np.testing.assert_allclose(np.round(found.centroid), [[-5, -1], [-5, 1], [5, 0]])
