@@ -398,3 +398,10 @@ def test_soft_wishes_cost_and_can_be_overruled(make_graph):
     assert weak.wish_cost.sum() == pytest.approx(0.4)
     with pytest.raises(ValueError, match="interval_price"):
         find_path(graph, beats, interval_price=wish[:, :3])
+
+
+@pytest.mark.parametrize("starts", [[0, 4], [-1, 0], [-1, 4], [4]])
+def test_starts_that_are_no_nodes_are_refused(make_graph, starts):
+    graph = make_graph([[0, 0.5], [0, 0.5]], [(0, 3, 1.0)], both_ways=True)
+    with pytest.raises(ValueError, match="starts: want 0 <= node < "):
+        find_path(graph, 0.5 * np.arange(3), starts=np.array(starts))

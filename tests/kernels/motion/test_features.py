@@ -149,6 +149,17 @@ def test_resampling_keeps_the_ends_and_few_frames():
     assert len(at_feature_rate(np.zeros((1, 2)), 30.0)) == 1
 
 
+def test_curves_stay_curves_at_the_feature_rate_and_three_frames_make_lines():
+    time_s = np.arange(31) / 30.0
+    wave = np.stack([np.sin(7 * time_s), np.cos(5 * time_s)], axis=1)
+    dense_s = np.arange(121) / 120.0
+    inner = slice(12, -12)  # natural ends are straight
+    expected = np.stack([np.sin(7 * dense_s), np.cos(5 * dense_s)], axis=1)
+    np.testing.assert_allclose(at_feature_rate(wave, 30.0)[inner], expected[inner], atol=1e-4)
+    np.testing.assert_allclose(at_feature_rate(np.array([0.0, 2.0, 0.0]), 60.0), [0, 1, 2, 1, 0], atol=1e-12)
+    np.testing.assert_array_equal(at_feature_rate(wave, 120.0), wave)
+
+
 def test_contacts_take_the_nearest_frame():
     contact = np.array([[True, False], [False, False]])
     np.testing.assert_array_equal(contacts_at_feature_rate(contact, 30.0, 5)[:, 0], [1, 1, 1, 0, 0])

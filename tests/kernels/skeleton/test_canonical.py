@@ -21,6 +21,13 @@ def test_it_stands_on_the_floor_facing_z_with_its_left_towards_x():
     assert REST["head"][1] > REST["neck"][1] > REST["hips"][1]
 
 
+def test_its_hips_are_over_the_origin_and_its_spine_is_upright():
+    np.testing.assert_array_equal(REST["hips"], [0, 0.94, 0])
+    for name in ("spine", "chest", "neck", "head"):
+        assert abs(REST[name][0]) < 1e-12
+        assert abs(REST[name][2]) < 0.05
+
+
 def test_left_and_right_mirror_each_other():
     for name, xyz in REST.items():
         if name.startswith("left"):
