@@ -154,7 +154,7 @@ class _Reader:
         return parts
 
     def _carried(self, session: str) -> dict[str, tuple[str, _Reading]]:
-        """Look up what is known of each clip: what it was read from, and its rows."""
+        """Look up the record of each clip: what it was read from, and its rows."""
         order = (CLIP, SKELETON, POSE, CALIBRATION)
         stamps = [self._earlier.stamp(table.name, session) for table in order]
         stored = [self._earlier.table(table.name, session) for table in order]

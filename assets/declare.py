@@ -1,4 +1,4 @@
-"""Assets that store declared tables: name, meaning, columns and versions said once, for every asset alike."""
+"""Assets that store declared tables: name, meaning, columns and versions are declared once, for every asset alike."""
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence

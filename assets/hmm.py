@@ -167,7 +167,7 @@ def model(
 
 
 def _learned(performance: pa.Table, clip: Stored, settings: ChoreographyModelSettings) -> list[Performance]:
-    """Take the performances that are learned from: those of the subject asked for, else all."""
+    """Take the performances to learn from: those of the subject in the settings, else all."""
     every = hmm_tables.to_performances(performance)
     if not settings.subject:
         return every

@@ -122,7 +122,7 @@ def refuse_changed(frames: pa.Table, licence_of: Mapping[str, str]) -> None:
 
 
 def _cast(text: str, studio: Studio, skeleton: Stored, pose: Stored) -> Cast | None:
-    """Find the character a dance is asked for with; None for odori's own body."""
+    """Find the character of a dance; None for odori's own mannequin."""
     try:
         if not text:
             return None

@@ -38,7 +38,7 @@ def settings() -> str:
     text = (
         "# Settings\n\nMade by `make docs` from `schemas/settings.py`. Every key has a default; an unknown key is an "
     )
-    text += "error.\n"
+    text += "error. Papers by [key](references.md), words in the [glossary](glossary.md).\n"
     for title, record in (("`odori.toml`", Settings()), ("`songs/NAME.brief.toml`", Brief())):
         text += f"\n## {title}\n\n| key | default | meaning |\n|---|---|---|\n" + "".join(_keys(record, ""))
     return text

@@ -1,4 +1,4 @@
-"""All assets in one list, and what is fresh of them: asked by definitions, sensor, schedule and command."""
+"""All assets in one list, and which of them are fresh: for definitions, sensor, schedule and command."""
 
 from collections.abc import Sequence
 

@@ -74,7 +74,7 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
 
 
 def _devices(known: dict[str, Devices], wanted: str) -> Devices:
-    """Give the devices by what is wanted: what failed in one run of this process is not taken again in the next."""
+    """Make the devices by the setting: one that failed in a run of this process is not taken again in the next."""
     if wanted not in known:
         known[wanted] = Devices(wanted)
     return known[wanted]

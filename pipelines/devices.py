@@ -68,7 +68,7 @@ class TrialMemory:
         self._path = folder / "odori" / "devices.json" if folder else None
 
     def recall(self, key: str) -> str | None:
-        """Give the reason remembered of a device, empty where it passed; None where nothing is known."""
+        """Look up why a device failed its trial, empty where it passed; None where it was not tried."""
         held = self._held().get(key)
         reason = held.get("reason") if isinstance(held, dict) else None
         if held is None or not isinstance(reason, str):

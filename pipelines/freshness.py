@@ -26,7 +26,7 @@ from schemas.keys import base_method
 
 STAGE_IO_MANAGER = "stage"
 ON_DEMAND = ("search",)
-"""Groups of assets that nobody makes before somebody asked for them once; from then on they are kept up to date."""
+"""Groups of assets that are made when first needed, and kept up to date from then on."""
 Kind = Literal["session", "song", "dance", "whole"]
 State = Literal["fresh", "stale", "missing", "waiting"]
 
@@ -145,7 +145,7 @@ class Freshness:
 
     @cached_property
     def sources(self) -> Sources:
-        """The sources as they were when first asked for.
+        """The sources as they were when first read.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class Freshness:
         return found
 
     def keys(self, kind: Kind) -> list[str]:
-        """Partitions there should be; of dances, those asked for so far."""
+        """Partitions there should be; of dances, those requested so far."""
         if kind == "session":
             return list(self.sources.sessions())
         if kind == "song":
@@ -314,7 +314,7 @@ class Freshness:
         return PartitionState(asset, key, "fresh")
 
     def is_danced(self, key: str) -> bool:
-        """Whether all that a dance consists of is as it was asked for."""
+        """Whether every part of a dance is up to date with its request."""
         return all(self.state(n.name, key).state == "fresh" for n in self.assets.values() if n.kind == "dance")
 
     def findings(

@@ -1,4 +1,4 @@
-"""What is asked of one dance: pins of the brief and of the command, licences, which alternative."""
+"""The direction of one dance: pins of the brief and of the command, licences, which alternative."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SOFT_WISH = 1.0
 
 @dataclass(frozen=True)
 class Direction:
-    """What is asked of one dance.
+    """The direction of one dance.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Direction:
 
 
 def direction_of(studio: Studio, key: str, *, pins: Sequence[str] | None = None) -> Direction:
-    """Gather what is asked of a dance: pins of the brief and of the command, licences, which alternative.
+    """Gather the direction of a dance: pins of the brief and of the command, licences, which alternative.
 
     Parameters
     ----------

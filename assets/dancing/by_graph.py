@@ -39,7 +39,7 @@ Chosen by hand: 1 a centimetre."""
 
 @dataclass(frozen=True, eq=False)
 class GraphCatalogue:
-    """The motion graph as a director may use it: clips by index, and what is known of the clip of each node.
+    """The motion graph as a director may use it: clips by index, and the facts of each node's clip.
 
     ``poses`` are what pins of a pose need; None where there are no such pins.
     """
@@ -59,7 +59,7 @@ def catalogue(
     *,
     poses: ClipPoses | None = None,
 ) -> GraphCatalogue:
-    """Join the graph with what is known of its clips, and take out what licences forbid.
+    """Join the graph with the facts of its clips, and take out what licences forbid.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def poses_of(canonical_pose: Stored, settings: Settings) -> ClipPoses:
 
 
 def by_graph(known: GraphCatalogue, song: PlayedSong, settings: Settings, asked: Direction) -> ChosenSteps:
-    """Find the best way through the motion graph for a song, as it is asked for.
+    """Find the cheapest path through the motion graph for a song that keeps its pins.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def by_graph(known: GraphCatalogue, song: PlayedSong, settings: Settings, asked:
 
 @dataclass(frozen=True, eq=False)
 class PathTerms:
-    """What is wished of a dance, for the search: (K, N) admitted, (K, N) priced, and prices of single steps.
+    """Pins and wishes as the search takes them: (K, N) admitted, (K, N) priced, and prices of single steps.
 
     ``from_any`` says whether a pose is wished for at the start.
     """
@@ -217,7 +217,7 @@ def strength_price(known: GraphCatalogue, song: PlayedSong, settings: PathSettin
 
 
 def pins_of(known: GraphCatalogue, song: PlayedSong, asked: Direction) -> list[Pin]:
-    """Bring what is wished onto beats and nodes; RefusalError where a pin names no place of the song."""
+    """Bring pins onto beats and nodes; RefusalError where a pin names no place of the song."""
     try:
         posed: dict[str, Pin] = {}
         if any(wish.pose for wish in asked.wishes):

@@ -56,7 +56,7 @@ cheapest loop would be danced to every song. Chosen by hand: half a seam."""
 
 @dataclass(frozen=True, eq=False)
 class Dancer:
-    """What is known of the dancer.
+    """The model of a dancer, and the recorded motions it may use.
 
     Parameters
     ----------

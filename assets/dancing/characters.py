@@ -39,7 +39,7 @@ class Cast:
 
 
 def character_of(studio: Studio, key: str, sources: Sources | None = None) -> str:
-    """Find which character a dance is asked for with: the command's, else the brief's; "" for odori's own body."""
+    """Find the character of a dance: the command's, else the brief's; "" for odori's own mannequin."""
     return request_of(studio, key).character or brief_of(studio, key.split("|")[0], sources).character
 
 

@@ -15,7 +15,7 @@ MOTION_PARTS = PartNames("motions of known kinds", "row of motions")
 
 
 def kept_or_refused(reach: SpanReach, nodes: Nodes, song: PlayedSong, asked: Direction) -> list[Pin]:
-    """Bring what is wished onto beats and motions; hard pins can be kept together.
+    """Bring pins onto beats and motions; hard pins can be kept together.
 
     Parameters
     ----------

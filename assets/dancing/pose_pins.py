@@ -31,7 +31,7 @@ ON_TIME_S = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ClipPoses:
-    """The poses of all clips, read as they are asked for.
+    """The poses of all clips, each read when first used.
 
     Parameters
     ----------

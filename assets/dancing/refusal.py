@@ -1,4 +1,4 @@
-"""A dance that cannot be had as it is asked for: what is wrong, which pins conflict, and what would work."""
+"""Refusals of a dance: what is wrong, which pins conflict, and which would work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a director asks of a dance, brought onto the beats of a song and the nodes of the motion graph."""
+"""Pins of a director, brought onto the beats of a song and the nodes of the motion graph."""
 
 import difflib
 import itertools
@@ -53,7 +53,7 @@ class Nodes:
         return np.asarray(self.label == wish.label)
 
     def instead_of(self, wish: PinWish) -> dict[str, NDArray[np.bool_]]:
-        """List what could be wished instead, as one would write it, and the nodes of each.
+        """List alternatives to a wish, as one would write them, and the nodes of each.
 
         Of the same kind: labels for a label or none, styles for a style, clips for a clip or a pose; what is spelt
         alike first, then what there is most of. After clips come labels.

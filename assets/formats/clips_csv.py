@@ -27,7 +27,7 @@ COLUMNS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of one clip; empty texts where nothing was said.
+    """Facts of one clip; empty texts where the file has none.
 
     ``is_labelled`` is false where the label only stands in for one that was not said.
     ``performed_to`` is the song it was danced to (key, file name or stem; ``none`` for no song of the studio),

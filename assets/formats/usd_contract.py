@@ -1,4 +1,4 @@
-"""The stage contract as rules: what a stage is asked, and what is said where it does not answer."""
+"""The stage contract as rules: what every stage must have, and the sentence for one that has not."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def open_stage(path: str | Path) -> Usd.Stage:
 
 
 def animated_skeleton(stage: Usd.Stage) -> UsdSkel.SkeletonQuery | None:
-    """Find the first skeleton under a SkelRoot whose animation can be asked.
+    """Find the first skeleton under a SkelRoot whose animation can be evaluated.
 
     Parameters
     ----------

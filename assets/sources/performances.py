@@ -15,7 +15,7 @@ NO_SONG = "none"
 
 @dataclass(frozen=True)
 class DancedClip:
-    """A clip, and what is said of the song it was danced to."""
+    """A clip, and which song it was danced to by its facts."""
 
     clip_id: str
     path: str

@@ -1,4 +1,4 @@
-"""Which recordings and songs a studio has, what is said and asked of them, and versions of it all.
+"""Recordings and songs of a studio, their facts, the requests for dances, and versions of all three.
 
 :mod:`assets.sources.scan` finds them.
 """
@@ -119,7 +119,7 @@ class Sources:
 
 @dataclass(frozen=True)
 class Request:
-    """What a person asked of one dance beside the brief; remembered, so that a nightly rebuild makes the same.
+    """A request for one dance, beside the brief; remembered, so that a nightly rebuild makes the same.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class Studio(Protocol):
         ...
 
     def requests(self) -> Mapping[str, Request]:
-        """List what was asked of dances, by ``<song>|<method>``."""
+        """List the requests for dances, by ``<song>|<method>``."""
         ...
 
 
@@ -270,7 +270,7 @@ def brief_version(studio: Studio, songs: Iterable[SongFile]) -> str:
 
 
 def request_of(studio: Studio, key: str) -> Request:
-    """Find what was asked of a dance; nothing special where nobody asked.
+    """Find the request for a dance; an empty one where there is none.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def request_of(studio: Studio, key: str) -> Request:
 
 
 def request_version(studio: Studio, key: str, sources: Sources | None = None) -> str:
-    """Version what was asked of a dance, by the command and by the brief of its song.
+    """Version the request for a dance, by the command and by the brief of its song.
 
     Whose body it is danced with comes later: :func:`assets.dancing.characters.character_version`.
 

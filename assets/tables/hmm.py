@@ -44,7 +44,7 @@ class ClipMotions:
     state: Int
 
     def known(self) -> ClipMotions:
-        """Take the motions of a known kind."""
+        """Take the motions that belong to a basic motion."""
         kept = self.state >= 0
         return ClipMotions(self.start_s[kept], self.end_s[kept], self.state[kept])
 

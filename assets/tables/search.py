@@ -80,7 +80,7 @@ def to_tracks(table: pa.Table) -> dict[str, NDArray[np.float32]]:
 def catalogue(
     sessions: Iterable[tuple[pa.Table, pa.Table]],
 ) -> tuple[dict[str, list[Any]], NDArray[np.float32], NDArray[np.float32]]:
-    """Join the embeddings of sessions with what is known of their clips.
+    """Join the embeddings of sessions with the facts of their clips.
 
     Parameters
     ----------
