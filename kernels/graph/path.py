@@ -342,7 +342,7 @@ def _explain(program: PathProgram, start: Int, bounds: tuple[float, float]) -> I
     """Say where and why no dance goes on, and what would help."""
     beat = program.furthest(start)
     time_s, last = float(program.beat_s[beat]), program.n_beats
-    where = f"path: want a dance to music beat {last}, but nothing goes on at beat {beat} ({time_s:.2f} s)"
+    where = f"path: want a dance to music beat {last:.0f}, got none past beat {beat} ({time_s:.2f} s)"
     here = [(kind, program.step_cost(beat, kind)) for kind in range(len(program.steps))]
     if program.n_nodes == 0:
         reason, why = "no_nodes", "the motion graph has no node; add clips in which beats are found"
@@ -371,5 +371,5 @@ def _tempo(program: PathProgram, beat: int, bounds: tuple[float, float]) -> str:
     found = "; ".join(spans) if spans else "no clip has as many beats as a step needs"
     return (
         f"no clip fits the song's tempo (or is admitted) at warp {bounds[0]:g} to {bounds[1]:g}: {found}; add clips "
-        "nearer to this tempo, choose the song's beats an octave away, or widen the bounds"
+        "nearer to this tempo, set beats.octave in the song's brief, or widen the bounds"
     )
