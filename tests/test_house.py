@@ -72,7 +72,6 @@ TESTED_ELSEWHERE = {
     "assets/matching.py",
     "assets/hmm.py",
     "assets/dancing/by_hmm.py",
-    "assets/dancing/hmm_wishes.py",  # in tests/pipelines/test_hmm.py
     "assets/dancing/recordings.py",
     "assets/motion.py",
     "assets/search.py",

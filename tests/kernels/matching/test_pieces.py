@@ -67,6 +67,11 @@ def test_other_starts_are_apart_and_within_the_clip():
     assert all(f + 1.1 * (len(SEGMENT) - 1) <= len(STEPS) - 1 for f in slow)
 
 
+def test_the_last_start_that_fits_is_one():
+    last = max(others(STEPS, 62, most=2, segment=STEPPING))
+    assert max(others(STEPS[: last + len(STEPPING)], 62, most=50, segment=STEPPING)) == last
+
+
 def test_what_matches_far_less_is_no_other_start():
     uneven = np.array([0.0, 50, 170])
     once = bumps(600, 200 + uneven, np.ones(3), width_s=0.05)
