@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import dagster as dg
 import numpy as np
-import polars as pl
 import pyarrow as pa
 
 from assets.declare import table_asset, table_assets
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.plots.dance import contact_sheet, dance_timeline, measure_table
 from assets.plots.draw import picture
+from assets.reading.clips import load_clips, read_clips
 from assets.sources.sources import Studio, request_of, request_version
 from assets.stamps import Part, Progress, Stored
 from assets.tables import matching as matching_tables
@@ -22,35 +22,18 @@ from assets.tables.choreography import (
     to_choreography,
     to_dance,
 )
-from assets.tables.motion import to_canonical_poses
 from assets.tables.music import to_music_beat
 from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.quality import Measure
 from kernels.assembly.timing import cover
-from kernels.skeleton.canonical import CANONICAL, mirror
-from kernels.types import Choreography, Clip
+from kernels.skeleton.canonical import CANONICAL
+from kernels.types import Choreography
 from schemas.choreography import DANCE_POSE, DANCE_QUALITY, FRAME_LINEAGE
-from schemas.keys import mirrored, source_clip
+from schemas.keys import source_clip
 
 _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
-
-
-def load_clips(canonical_pose: Stored, steps: Choreography) -> dict[str, Clip]:
-    """Read the canonical clips a choreography dances, and no others."""
-    names = set(steps.clip_id)
-    wanted = {source_clip(name) for name in names}
-    found: dict[str, Clip] = {}
-    for key in canonical_pose.keys:
-        here = wanted & set(canonical_pose.stamp(key).clips)
-        if here:
-            for moved in to_canonical_poses(canonical_pose.read(key, clip_ids=here)):
-                images = {moved.clip_id: (moved.root_xyz_m, moved.rotation_wxyz)}
-                if mirrored(moved.clip_id) in names:
-                    images[mirrored(moved.clip_id)] = mirror(moved.root_xyz_m, moved.rotation_wxyz)
-                found |= {name: Clip(CANONICAL, moved.frame_rate_hz, *motion) for name, motion in images.items()}
-    return found
 
 
 @table_assets(
@@ -167,10 +150,4 @@ def _of_sources(steps: Choreography) -> Choreography:
 
 def _seconds(clip: Stored) -> dict[str, float]:
     """Length of every clip that was read."""
-    rows = pl.concat([_rows(clip.read(key)) for key in clip.keys])
-    return dict(rows.select("clip_id", "duration_s").iter_rows())
-
-
-def _rows(clip: pa.Table) -> pl.DataFrame:
-    """Take the clips that were read."""
-    return pl.DataFrame(clip).filter(pl.col("state") == "read")
+    return dict(read_clips(clip).select("clip_id", "duration_s").iter_rows())

@@ -13,6 +13,7 @@ from assets.graph_memory import Beats, KeptArrays, keep, near_pairs, recall
 from assets.partitions import EVERY
 from assets.plots.draw import markdown
 from assets.plots.graph import motion_graph_picture
+from assets.reading.clips import image_of
 from assets.sources.sources import Studio
 from assets.stamps import Part, Progress, Stored, version_of
 from assets.tables import pack
@@ -26,8 +27,7 @@ from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, 
 from kernels.graph.shortlist import nearest_of
 from kernels.graph.transitions import Transitions, blend_margin_s, connect
 from kernels.motion.velocity import accents, jerk_around, speed_between
-from kernels.skeleton.canonical import CANONICAL, JOINTS, mirror
-from kernels.skeleton.kinematics import forward
+from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float, MotionGraph
 from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
 from schemas.keys import mirrored, source_clip
@@ -72,7 +72,7 @@ def motion_graph(
     labels: dict[str, str] = {}
     beats = []
     for key in motion_beat.keys:
-        labels |= {row["clip_id"]: row["label"] for row in clip.read(key).to_pylist() if row["state"] == "read"}
+        labels |= {row["clip_id"]: row["label"] for row in pack.read_rows(clip.read(key)).to_pylist()}
         beats += _session(key, labels, canonical_pose, motion_beat, settings, known)
         progress.step()
     nodes = beat_nodes([b.time_s for b in beats], [b.duration_s for b in beats])
@@ -146,18 +146,11 @@ def _session(
         if clip_id in poses:
             moved = to_canonical_pose(poses[clip_id])
             time_s = pack.to_numbers(beats[clip_id]["time_s"])
-            each = (moved, _image(moved))[: len(images[clip_id])]
+            each = (moved, image_of(moved))[: len(images[clip_id])]
             found += [_beats(image, time_s, versions[clip_id], settings) for image in each]
         elif clip_id in versions and clip_id not in changed:
             found += [known[name] for name in images[clip_id]]
     return found
-
-
-def _image(moved: CanonicalClip) -> CanonicalClip:
-    """Mirror a clip, left for right."""
-    root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
-    position, _ = forward(CANONICAL, root, turned)
-    return CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
 
 
 def _beats(moved: CanonicalClip, beat_s: Float, version: str, settings: MotionGraphSettings) -> Beats:

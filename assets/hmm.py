@@ -42,8 +42,8 @@ hand."""
 )
 def performance(clip: Stored, song: Stored) -> Iterator[dg.Output[Part] | dg.AssetCheckResult]:
     """Pair clips with the songs they were danced to."""
-    clips = [row for key in clip.keys for row in clip.read(key).to_pylist() if row["state"] == "read"]
-    songs = [row for key in song.keys for row in song.read(key).to_pylist() if row["state"] == "read"]
+    clips = [row for key in clip.keys for row in pack.read_rows(clip.read(key)).to_pylist()]
+    songs = [row for key in song.keys for row in pack.read_rows(song.read(key)).to_pylist()]
     found, troubles = performances.pair(
         [performances.DancedClip(r["clip_id"], r["path"], r["performed_to"], r["performed_offset_s"]) for r in clips],
         [performances.NamedSong(r["song_id"], r["path"], r["kind"]) for r in songs],

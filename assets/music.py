@@ -252,7 +252,7 @@ def music_analysis(
     made: list[tuple[Part, Part, Part]] = []
     for key in keys:
         version = version_of(song_version(songs.get(key, ())), brief_version(studio, songs.get(key, ())))
-        read = [row for row in song.read(key).to_pylist() if row["state"] == "read"]
+        read = pack.read_rows(song.read(key)).to_pylist()
         grid = to_music_beat(music_beat.read(key))
         if read and len(grid.time_s) >= 2:
             with repeatable():

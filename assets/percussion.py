@@ -12,6 +12,7 @@ from assets.plots import hmm as hmm_plots
 from assets.sources.sources import Studio, brief_version, song_version
 from assets.stamps import Part, Parts, Progress, Stored, repeatable, version_of
 from assets.tables import hmm as hmm_tables
+from assets.tables.pack import read_rows
 from kernels.music.percussion import Contour, band_hits, contour, drum_hits
 from kernels.music.preview import render_preview
 from schemas.music import MELODY, PERCUSSION
@@ -42,7 +43,7 @@ def percussion_and_melody(
     made: list[tuple[Part, Part]] = []
     for key in keys:
         version = version_of(song_version(songs.get(key, ())), brief_version(studio, songs.get(key, ())))
-        read = [row for row in song.read(key).to_pylist() if row["state"] == "read"]
+        read = read_rows(song.read(key)).to_pylist()
         if read:
             with repeatable():
                 made.append(_heard(key, read[0], studio, version))

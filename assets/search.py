@@ -107,7 +107,7 @@ def _examples(clip: Stored, canonical_pose: Stored, settings: SearchSettings) ->
     """Take windows to learn from: evenly spread in long clips, and of too many an even share."""
     found = []
     for key in canonical_pose.keys:
-        rows = {row["clip_id"]: row for row in clip.read(key).to_pylist() if row["state"] == "read"}
+        rows = {row["clip_id"]: row for row in pack.read_rows(clip.read(key)).to_pylist()}
         for moved in to_canonical_poses(canonical_pose.read(key)):
             if moved.clip_id not in rows:
                 continue

@@ -18,6 +18,7 @@ from assets.formats import audio, midi
 from assets.formats.audio import Audio
 from assets.formats.usd_character import is_file
 from assets.partitions import DANCE, EVERY, lake_key
+from assets.reading.clips import read_clips
 from assets.sources.sources import Studio
 from assets.stamps import Progress, Stored
 from assets.tables import pack
@@ -77,7 +78,7 @@ def usd_animation(
     progress.begin("writing the stage", 1)
     key = lake_key(context.partition_key)
     song_id, method = key.split("|")
-    played = next(row for row in song.to_pylist() if row["state"] == "read")
+    played = pack.read_rows(song).to_pylist()[0]
     steps = to_choreography(choreography)
     moved = Clip(
         CANONICAL,
@@ -141,9 +142,7 @@ def _sound(song: Mapping[str, Any], studio: Studio) -> Audio:
 
 
 def _provenance(song: Mapping[str, Any], method: str, steps: Choreography, clip: Stored) -> dict[str, Any]:
-    danced = pl.concat(
-        [read_rows(clip.read(key, clip_ids={source_clip(name) for name in steps.clip_id})) for key in clip.keys]
-    )
+    danced = read_clips(clip, {source_clip(name) for name in steps.clip_id})
     return {
         "method": method,
         "song": {"path": song["path"], "sha256": song["source_sha256"]},
@@ -166,11 +165,6 @@ def outside_warp(steps: Choreography) -> list[dict[str, Any]]:
         }
         for i in np.flatnonzero((warp < EASY_WARP[0] - 1e-6) | (warp > EASY_WARP[1] + 1e-6))
     ]
-
-
-def read_rows(clip: pa.Table) -> pl.DataFrame:
-    """Take the clips that were read."""
-    return pl.DataFrame(clip).filter(pl.col("state") == "read")
 
 
 def _quality(table: pa.Table) -> dict[str, Any]:

@@ -18,10 +18,9 @@ from pathlib import Path
 import numpy as np
 from upath import UPath
 
-from assets.dance import load_clips
 from assets.dancing.asked import Direction
 from assets.dancing.by_graph import GraphCatalogue, by_graph, catalogue
-from assets.reading.clips import read_clips
+from assets.reading.clips import load_clips, read_clips
 from assets.reading.songs import PlayedSong, played_song
 from assets.tables.graph import to_motion_graph
 from assets.tables.music import to_music_beat

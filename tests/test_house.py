@@ -56,7 +56,6 @@ def test_no_public_class_name_means_two_things():
 TESTED_ELSEWHERE = {
     "assets/dancing/method.py",  # records
     "assets/dancing/match_pieces.py",  # in test_by_matching.py
-    "assets/reading/clips.py",
     "pipelines/commands/build.py",  # in test_commands.py and test_build.py
     "pipelines/commands/check.py",
     "pipelines/commands/dance.py",

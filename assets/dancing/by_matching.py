@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from assets.dancing import licences
 from assets.dancing.danced import ChosenSteps, Markdown
@@ -13,9 +12,8 @@ from assets.dancing.method import DanceOrder, Method
 from assets.dancing.refusal import RefusalError
 from assets.plots import matching as matching_plots
 from assets.plots.dance import phrase_table
-from assets.reading.clips import read_clips
+from assets.reading.clips import named_clips, read_clips
 from assets.stamps import Stored, repeatable
-from assets.tables.motion import to_canonical_poses
 from kernels.assembly.timing import blend_widths, cover
 from kernels.matching import connect, path
 from kernels.motion.features import at_feature_rate, link_directions, link_weights
@@ -189,15 +187,12 @@ def _no_poses(n: int, n_links: int) -> connect.JointPoses:
 
 def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str, Float, tuple[float, float]]]:
     """Link directions of the wanted clips at 120 Hz, one clip at a time, and the seconds between which it is usable."""
-    for key in canonical_pose.keys:
-        here = wanted & set(canonical_pose.stamp(key).clips)
-        rows: pa.Table | None = canonical_pose.read(key, clip_ids=here) if here else None
-        for moved in to_canonical_poses(rows) if rows is not None else ():
-            position = at_feature_rate(moved.position_xyz_m, moved.frame_rate_hz)
-            root = at_feature_rate(moved.rotation_wxyz[:, 0], moved.frame_rate_hz)
-            first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
-            usable_s = first / moved.frame_rate_hz, last / moved.frame_rate_hz
-            yield moved.clip_id, link_directions(position, root, CANONICAL.parent), usable_s
+    for moved in named_clips(canonical_pose, wanted):
+        position = at_feature_rate(moved.position_xyz_m, moved.frame_rate_hz)
+        root = at_feature_rate(moved.rotation_wxyz[:, 0], moved.frame_rate_hz)
+        first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
+        usable_s = first / moved.frame_rate_hz, last / moved.frame_rate_hz
+        yield moved.clip_id, link_directions(position, root, CANONICAL.parent), usable_s
 
 
 def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:

@@ -9,9 +9,10 @@ import polars as pl
 from numpy.typing import NDArray
 
 from assets.dancing.wishes import DirectionError, stretch
+from assets.reading.clips import named_clips
 from assets.reading.songs import PlayedSong
 from assets.stamps import Stored
-from assets.tables.motion import CanonicalClip, to_canonical_poses
+from assets.tables.motion import CanonicalClip
 from kernels.graph.distance import pose_distance
 from kernels.graph.features import VELOCITY_TIME_S, BeatFeatures, beat_features
 from kernels.graph.path import STEPS
@@ -19,8 +20,6 @@ from kernels.graph.pins import Pin
 from kernels.graph.poses import furthest_ratio, pose_price, pose_ratio, pose_steps
 from kernels.graph.program import StepPrice, step_ends
 from kernels.graph.transitions import THRESHOLD
-from kernels.skeleton.canonical import CANONICAL, mirror
-from kernels.skeleton.kinematics import forward
 from kernels.types import Float, MotionGraph
 from schemas.keys import is_mirrored, mirrored, source_clip
 from schemas.pins import PinWish
@@ -50,20 +49,11 @@ class ClipPoses:
         ----------
         names : clips, or mirrored ones as :func:`schemas.keys.mirrored` names them
 
-        Yields
-        ------
-        CanonicalClip, in the stored order
+        Returns
+        -------
+        iterator of CanonicalClip, in the stored order
         """
-        wanted = {source_clip(name) for name in names}
-        for key in self.stored.keys:
-            here = wanted & set(self.stored.stamp(key).clips)
-            for moved in to_canonical_poses(self.stored.read(key, clip_ids=here)) if here else ():
-                if moved.clip_id in names:
-                    yield moved
-                if mirrored(moved.clip_id) in names:
-                    root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
-                    position, _ = forward(CANONICAL, root, turned)
-                    yield CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
+        return named_clips(self.stored, names)
 
     def wanted(self, wish: PinWish) -> BeatFeatures | None:
         """Take the pose of a wish; None where there is no such clip.

@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
+from assets.reading.clips import named_clips
 from assets.stamps import Stored
-from assets.tables.motion import CanonicalClip, to_canonical_poses
+from assets.tables.motion import CanonicalClip
 from kernels.graph.features import beat_features
 from kernels.hmm import instances
 from kernels.hmm.decode import Chain
@@ -35,12 +35,9 @@ def ends_of(motions: Motions, clip_ids: tuple[str, ...], canonical_pose: Stored,
     """
     wanted = {clip_ids[i]: np.flatnonzero(motions.clip_index == i) for i in np.unique(motions.clip_index).tolist()}
     found: dict[str, Ends] = {}
-    for key in canonical_pose.keys:
-        here = set(wanted) & set(canonical_pose.stamp(key).clips)
-        rows: pa.Table | None = canonical_pose.read(key, clip_ids=here) if here else None
-        for moved in to_canonical_poses(rows) if rows is not None else ():
-            at = wanted[moved.clip_id]
-            found[moved.clip_id] = _ends(moved, motions.start_s[at], motions.end_s[at], blend_s)
+    for moved in named_clips(canonical_pose, wanted):
+        at = wanted[moved.clip_id]
+        found[moved.clip_id] = _ends(moved, motions.start_s[at], motions.end_s[at], blend_s)
     return concatenate_ends([found[clip] for clip in wanted])
 
 

@@ -54,6 +54,11 @@ def by_clip(table: pa.Table, column: str = "clip_id") -> dict[str, pa.Table]:
     return parts
 
 
+def read_rows(rows: pa.Table) -> pa.Table:
+    """Take the rows of clips or of songs that were read; others were refused."""
+    return rows.filter(pc.equal(rows["state"], "read"))
+
+
 def vectors(values: Float) -> pa.Array:
     """Pack (F, J, n) as a list of J fixed-size lists a row, float32."""
     f, j, n = values.shape

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from assets.tables.pack import read_rows
 from kernels.search.aligned import N_TRACK
 from kernels.search.discriminant import unit
 from kernels.search.nearest import Proposal
@@ -95,7 +96,7 @@ def catalogue(
     vectors = [np.zeros((0, N_EMBEDDING), np.float32)]
     track: dict[str, NDArray[np.float32]] = {}
     for clips, embedded in sessions:
-        known = {row["clip_id"]: row for row in clips.to_pylist() if row["state"] == "read"}
+        known = {row["clip_id"]: row for row in read_rows(clips).to_pylist()}
         plain = embedded.select([c for c in embedded.column_names if c not in ("embedding", "track_m")]).to_pylist()
         is_kept = np.array([row["clip_id"] in known for row in plain], bool)
         rows += [{**known[row["clip_id"]], **row} for row in plain if row["clip_id"] in known]
