@@ -35,6 +35,12 @@ wheel: $(STAMP) ## dist/odori-*.whl, which needs no checkout
 test: $(STAMP) ## the tests
 	@$(BIN)/python -m pytest -n auto --dist loadfile
 
+mutants: $(STAMP) ## small changes of kernels and of dancing, which tests have to find; goes on where it was ended
+	@$(BIN)/python tests/mutants/run.py
+
+mutants-sample: $(STAMP) ## a part of them again; a kill that is lost is an error
+	@$(BIN)/python tests/mutants/run.py --sample
+
 lint: $(STAMP) ## style, types, import contracts
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
@@ -62,4 +68,4 @@ lock: $(STAMP) ## resolve the dependencies anew
 	@echo 'bpy==4.5.*' | $(BIN)/uv pip compile - --quiet --python-version 3.11 --python-platform x86_64-manylinux_2_28 \
 	  --generate-hashes --no-annotate --no-emit-index-url --no-emit-find-links --no-header -o requirements-blender.lock
 
-.PHONY: help install demo wheel test lint docs blender lock
+.PHONY: help install demo wheel test mutants mutants-sample lint docs blender lock
