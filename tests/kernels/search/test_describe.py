@@ -49,3 +49,21 @@ def test_a_hand_is_seen_from_the_shoulder(rng):
     moved[:, : 3 * 22] += np.float32(5)
     reach = slice(N_CHANNELS, N_CHANNELS + 28)
     np.testing.assert_allclose(describe(moved)[reach], describe(value)[reach], atol=1e-5)
+
+
+def test_a_stretch_longer_than_the_transform_counts_in_all_its_parts():
+    value = np.zeros((256, N_CHANNELS), np.float32)
+    value[:, VELOCITY.start] = np.sin(2 * np.pi * 8 * np.arange(256) / 128)
+    energy = [describe(part)[-25 * 22 : -19 * 22] for part in (value[:128], value)]
+    np.testing.assert_allclose(energy[0], energy[1], atol=1e-6)
+    half = value.copy()
+    half[128:] = 0
+    band = energy[0].reshape(6, 22)[:, 0].argmax()
+    quiet = describe(half)[-25 * 22 : -19 * 22].reshape(6, 22)[band, 0]
+    assert quiet == pytest.approx(energy[0].reshape(6, 22)[band, 0] - np.log(2), abs=1e-3)
+
+
+def test_a_motion_of_one_frame_has_it_in_every_third(rng):
+    value = rng.normal(size=(1, N_CHANNELS)).astype(np.float32)
+    parts = describe(value)[4 * (N_CHANNELS + 28) :][: 3 * N_CHANNELS].reshape(3, N_CHANNELS)
+    np.testing.assert_allclose(parts, np.repeat(value, 3, axis=0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kernels.search.augment import mirror
-from kernels.search.fit import fit, mirrored_labels, statistics_of
+from kernels.search.fit import _held_out, fit, mirrored_labels, statistics_of
 from kernels.search.measure import leave_one_out
 from kernels.search.normalise import channels
 from kernels.search.train import Training
@@ -91,3 +91,23 @@ def test_labels_that_mirror_each_other_are_found(dances):
     number = np.repeat([0, 1, 2], [4, 4, 4])
     turned = mirrored_labels(both, number, statistics_of(both, has_travel=True), has_travel=True)
     assert turned[:8].tolist() == [1] * 4 + [0] * 4
+
+
+def test_whole_takes_are_held_out_and_never_the_only_one_of_a_label():
+    label = np.repeat([0, 1, 2], [12, 12, 2])
+    take = np.concatenate([np.repeat(np.arange(6), 2), np.repeat(np.arange(6, 12), 2), [12, 12]])
+    for seed in range(5):
+        held = _held_out(label, take, seed)
+        assert held.any()
+        assert not held[24:].any()
+        assert not set(take[held].tolist()) & set(take[~held].tolist())
+
+
+def test_a_label_of_fewer_than_three_clips_mirrors_nothing(dances):
+    motions, labels = dances
+    few = [m for m, label in zip(motions, labels, strict=True) if label == "wave"][:2]
+    others = [m for m, label in zip(motions, labels, strict=True) if label == "twist"]
+    both = [*few, *others]
+    turned = mirrored_labels(both, np.repeat([0, 1], [2, 4]), statistics_of(both, has_travel=True), has_travel=True)
+    assert turned[:2].tolist() == [-1, -1]
+    assert turned[2:].tolist() == [1] * 4

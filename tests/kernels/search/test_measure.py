@@ -62,3 +62,21 @@ def test_confusions_are_counted_by_label_and_label_of_the_nearest():
     assert found.first_ratio == 1
     assert leave_one_out(vector[:1], ["a"]).first_ratio == 0
     assert leave_one_out(np.zeros((0, 2)), []).names == ()
+
+
+def test_the_largest_groups_are_dealt_first_so_that_folds_are_even():
+    group = ["a"] + ["b"] * 2 + ["c"] * 3 + ["d"] * 4
+    assert sorted(int(fold.sum()) for fold in group_folds(group, 2)) == [5, 5]
+
+
+def test_the_remainders_of_labels_go_to_different_folds():
+    folds = label_folds(np.repeat([0, 1, 2], 1), 3, np.random.default_rng(0))
+    assert [int(fold.sum()) for fold in folds] == [1, 1, 1]
+
+
+def test_a_clip_whose_nearest_is_alone_in_its_label_is_counted_there():
+    vector = np.array([[1.0, 0.0], [0.9, 0.44], [0.8, 0.6]])
+    found = leave_one_out(vector, ["a", "a", "alone"])
+    assert found.names == ("a", "alone")
+    np.testing.assert_array_equal(found.count, [[1, 1], [0, 0]])
+    assert found.first_ratio == 0.5

@@ -112,3 +112,70 @@ def test_copies_are_looked_for_among_candidates_by_the_clips_own_numbers(catalog
 
     nearest_clips(vector, start, vector[:1], k=2, candidates=lambda query, n: np.array([6, 21]), copies=copies)
     assert sorted(seen) == [2, 7]
+
+
+def test_of_clips_as_near_the_one_that_stands_first_comes_first(catalogue):
+    vector, start = catalogue
+    twice = np.concatenate([vector, vector])
+    hits = nearest_clips(twice, np.concatenate([start, 30 + start]), vector[6:9], k=3)
+    assert [h.clip for h in hits[:2]] == [2, 12]
+    assert hits[0].distance == hits[1].distance == 0
+
+
+def test_no_more_hits_than_wanted_and_one_a_clip(catalogue):
+    vector, start = catalogue
+    for k, n in ((0, 0), (1, 1), (4, 4), (99, 10)):
+        hits = nearest_clips(vector, start, vector[:3], k=k)
+        assert len(hits) == len({h.clip for h in hits}) == n
+
+
+def test_of_a_long_query_sixteen_windows_from_its_first_to_its_last_count(catalogue):
+    vector, start = catalogue
+    query = np.repeat(vector[:1], 61, axis=0)  # every fourth window counts
+    query[1::4], query[2::4], query[3::4] = vector[9], vector[9], vector[9]
+    found = nearest_clips(vector, start, query, k=1)[0]
+    assert (found.clip, found.distance) == (0, 0.0)
+    query[60] = vector[9]
+    last = nearest_clips(vector, start, query, k=1)[0]
+    assert last.distance == pytest.approx(np.linalg.norm(vector[9] - vector[:3], axis=1).min() / 16, rel=1e-4)
+
+
+def test_the_window_of_a_query_that_is_nearest_is_told_by_its_own_number(catalogue):
+    vector, start = catalogue
+    query = np.tile(vector[27:28], (40, 1))
+    query[39] = vector[4]
+    hit = next(h for h in nearest_clips(vector, start, query, k=10) if h.clip == 1)
+    assert (hit.row, hit.query_row) == (4, 39)
+
+
+def test_what_is_liked_counts_whole_and_what_is_not_by_half():
+    query, like, unlike = (np.eye(3, dtype=np.float32)[i : i + 1] for i in range(3))
+    np.testing.assert_allclose(steer(query, like, unlike), np.array([[1, 1, -0.5]]) / 1.5, atol=1e-6)
+    two = np.concatenate([like, unlike])  # two wishes count as their mean
+    np.testing.assert_allclose(steer(query, two, unlike[:0]), np.array([[1, 0.5, 0.5]]) / np.sqrt(1.5), atol=1e-6)
+    assert steer(np.repeat(query, 3, axis=0), like, unlike[:0]).shape == (3, 3)
+
+
+def test_wishes_that_cancel_point_nowhere():
+    one = np.eye(2, dtype=np.float32)[:1]
+    assert not steer(one, one[:0], 2 * one).any()
+
+
+def test_a_vote_weighs_by_its_distance_beside_the_nearest():
+    (found,) = propose(np.array([[0.2, 0.4, 0.4]]), np.array([1, 0, 0]))
+    one, two = np.exp(-1.0), 2 * np.exp(-4.0)
+    assert [(p.label, p.nearest, p.distance) for p in found] == [(1, 0, 0.2), (0, 1, 0.4)]
+    assert [p.vote_ratio for p in found] == pytest.approx([one / (one + two), two / (one + two)])
+
+
+def test_of_labels_with_as_many_votes_the_first_is_proposed_first_and_no_more_than_wanted():
+    label = np.array([3, 1, 2, 0])
+    (found,) = propose(np.full((1, 4), 0.5), label)
+    assert [p.label for p in found] == [0, 1, 2]
+    (one,) = propose(np.full((1, 4), 0.5), label, n_neighbours=3, n_proposals=1)
+    assert [(p.label, p.vote_ratio) for p in one] == [(1, pytest.approx(1 / 3))]
+
+
+def test_of_one_labels_clips_the_nearest_is_named():
+    (found,) = propose(np.array([[0.3, 0.1, 0.2]]), np.array([5, 5, 5]))
+    assert (found[0].nearest, found[0].distance, found[0].vote_ratio) == (1, 0.1, pytest.approx(1))

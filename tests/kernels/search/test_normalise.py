@@ -14,7 +14,7 @@ from kernels.search.normalise import (
     resample,
 )
 from kernels.skeleton import kinematics
-from kernels.skeleton.canonical import CANONICAL, LEG_LENGTH_M
+from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
 
 REST = kinematics.rest_position(CANONICAL)[None]
 
@@ -100,3 +100,31 @@ def test_other_shapes_are_refused(shape):
 def test_gaps_are_refused():
     with pytest.raises(ValueError, match="finite"):
         normalise(np.full((2, 22, 3), np.nan))
+
+
+def test_a_leg_is_the_median_over_frames_of_both_sides_mean():
+    legs = np.repeat(REST, 5, axis=0)
+    legs[0] *= 9.0
+    assert leg_length_m(legs) == pytest.approx(LEG_LENGTH_M)
+    longer = REST.copy()
+    left = [JOINTS.index(f"left{part}") for part in ("LowerLeg", "Foot")]
+    longer[:, left[1], 1] -= 0.2  # one shin 20 cm longer
+    assert leg_length_m(longer) == pytest.approx(LEG_LENGTH_M + 0.1)
+
+
+def test_a_body_without_legs_keeps_its_size():
+    np.testing.assert_array_equal(normalise(np.zeros((2, 22, 3))), np.zeros((2, 22, 3)))
+
+
+def test_hips_that_are_not_yet_seen_face_as_they_do_when_they_are():
+    sideways = rotation.apply(rotation.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.pi / 2), REST)
+    turned = rotation.apply(rotation.from_heading(1.0), REST)
+    np.testing.assert_allclose(heading_rad(np.concatenate([sideways, turned])), 1.0, atol=1e-9)
+
+
+def test_a_stretch_lies_straight_between_frames_and_one_beyond_the_clip_is_its_end():
+    rising = np.arange(4.0)[:, None, None] * np.ones((1, 22, 3))
+    np.testing.assert_allclose(resample(rising, 1.0, 0.5, 2.5, rate_hz=2.0)[:, 0, 0], [0.5, 1.0, 1.5, 2.0, 2.5])
+    np.testing.assert_allclose(resample(rising, 1.0, 2.0, 99.0, rate_hz=2.0)[:, 0, 0], [2.0, 2.5, 3.0])
+    np.testing.assert_allclose(resample(rising, 1.0, 7.0, 9.0)[:, 0, 0], [3.0])
+    np.testing.assert_allclose(resample(rising[:1], 1.0, 0.0, 9.0)[:, 0, 0], [0.0])
