@@ -79,3 +79,54 @@ def test_slow_trackers_raise_no_alarm():
     body = suit.make_body(4)
     made = suit.record(body, suit.range_of_motion(4, n_frames=2000, frame_rate_hz=30.0), seed=4)
     assert clean(made.recording).findings == ()
+
+
+def test_a_filter_acts_up_to_four_tenths_of_the_rate_and_from_sixteen_frames_on():
+    rough = np.tile([0.0, 1.0], 20)
+    for rate_hz, n, acts in ((30.0, 40, True), (29.9, 40, False), (120.0, 16, True), (120.0, 15, False)):
+        got, gain = low_pass(rough[:n], rate_hz)
+        assert (gain < 1) == acts
+        assert (got != rough[:n]).any() == acts
+
+
+def test_noise_is_measured_where_four_good_frames_follow_each_other():
+    rng = np.random.default_rng(0)
+    position, turned = rng.normal(0, 0.002, (400, 1, 3)), np.tile([1.0, 0, 0, 0], (400, 1, 1))
+    position[2::4] += 5.0
+    is_good = np.ones((400, 1), bool)
+    is_good[2::4] = False
+    assert noise(position, turned, is_good)[0][0] == 0  # never more than three
+    position[:200:4] = rng.normal(0, 0.002, (50, 1, 3))
+    position[2:200:4] -= 5.0
+    is_good[:200] = True
+    assert noise(position, turned, is_good)[0][0] == pytest.approx(0.002, rel=0.2)
+
+
+def spoilt(made, **changed):
+    return clean(replace(made.recording, **changed))
+
+
+def test_valid_entries_without_numbers_or_without_a_direction_are_filled(perfect):
+    position, turned = perfect.recording.position_xyz_m.copy(), perfect.recording.rotation_wxyz.copy()
+    position[700, 3, 1] = np.nan
+    turned[800, 4] = 0.0
+    found = spoilt(perfect, position_xyz_m=position, rotation_wxyz=turned)
+    assert found.is_filled[700, 3]
+    assert found.is_filled[800, 4]
+    assert np.isfinite(found.recording.position_xyz_m).all()
+    np.testing.assert_allclose(found.recording.position_xyz_m[700, 3], perfect.sensor_xyz_m[700, 3], atol=0.002)
+
+
+def test_many_outliers_of_a_sensor_are_told_and_few_are_not(perfect):
+    rng = np.random.default_rng(0)
+    for share, told in ((0.04, False), (0.08, True)):
+        position = perfect.recording.position_xyz_m.copy()
+        wrong = 300 + 25 * np.arange(100) if share < 0.05 else 300 + 10 * np.arange(240)
+        position[wrong, 9] += 0.4 * np.sign(rng.normal(size=(len(wrong), 3)))
+        found = spoilt(perfect, position_xyz_m=position).findings
+        assert any("outliers" in one.sentence and one.sensor == SENSORS[9] for one in found) == told
+
+
+def test_in_another_unit_outliers_are_not_judged(perfect):
+    found = spoilt(perfect, position_xyz_m=100.0 * perfect.recording.position_xyz_m).findings
+    assert ["multiply by" in one.sentence for one in found] == [True]

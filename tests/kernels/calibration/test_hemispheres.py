@@ -33,3 +33,75 @@ def test_nothing_to_judge():
     none = np.zeros((0, 17))
     assert undo_hemispheres(np.zeros((0, 17, 3)), none > 0, sensors=SENSORS)[1] == []
     assert undo_hemispheres(np.ones((50, 17, 3)), np.zeros((50, 17), bool), sensors=SENSORS)[1] == []
+
+
+NAMES = ("a", "b", "c", "d")
+
+
+def around(place, n=60):
+    """Three sensors a metre from the source, and one that is where it is told: (n, 4, 3)."""
+    position = np.zeros((n, 4, 3))
+    position[:, :3] = [[1.0, 0.1, 0.0], [1.0, -0.1, 0.0], [1.0, 0.0, 0.1]]
+    position[:, 3] = place
+    return position
+
+
+def turned_back(position, is_usable=None):
+    is_usable = np.ones(position.shape[:2], bool) if is_usable is None else is_usable
+    return undo_hemispheres(position, is_usable, sensors=NAMES)
+
+
+@pytest.mark.parametrize(("place", "mirrored"), [((-0.1, 1.0, 0.0), False), ((-0.9, 0.3, 0.0), True)])
+def test_a_sensor_that_never_jumps_is_turned_only_where_it_would_lie_half_as_far(place, mirrored):
+    mended, found = turned_back(around(place))
+    np.testing.assert_array_equal(mended[:, 3], np.tile(np.array(place) * (-1 if mirrored else 1), (60, 1)))
+    assert len(found) == mirrored
+
+
+def test_one_that_jumps_is_turned_to_the_nearer_side():
+    place = np.tile([-0.1, 1.0, 0.0], (60, 1))
+    place[30:] *= -1
+    mended, found = turned_back(around(place))
+    np.testing.assert_array_equal(mended[:, 3], np.tile([0.1, -1.0, 0.0], (60, 1)))
+    assert [one.frame_index for one in found] == [0]
+
+
+def test_where_it_cannot_be_told_which_half_is_mirrored_that_is_an_error():
+    place = np.tile([0.01, 0.5, 0.0], (60, 1))
+    place[30:] *= -1
+    _, (found,) = turned_back(around(place))
+    assert (found.severity, found.sensor) == ("error", "d")
+    assert "cannot be told" in found.sentence
+
+
+@pytest.mark.parametrize(("size_m", "n_mirrored"), [(0.09, 0), (0.11, 30)])
+def test_a_jump_is_longer_than_20_cm(size_m, n_mirrored):
+    place = np.tile([size_m, 0.0, 0.0], (60, 1))
+    place[30:] *= -1
+    mended, _ = turned_back(around(place))
+    assert (mended[:, 3] != place).any(axis=1).sum() == n_mirrored
+
+
+@pytest.mark.parametrize(("off_m", "n_mirrored"), [(0.15, 30), (0.25, 0)])
+def test_and_ends_opposite_within_a_fifth(off_m, n_mirrored):
+    place = np.tile([0.5, 0.0, 0.0], (60, 1))
+    place[30:] = [-0.5, off_m, 0.0]
+    mended, _ = turned_back(around(place))
+    assert (mended[:, 3] != place).any(axis=1).sum() == n_mirrored
+
+
+@pytest.mark.parametrize(("n", "n_mirrored"), [(2, 0), (6, 6)])
+def test_a_short_visit_to_the_other_side_is_left_to_the_outliers(n, n_mirrored):
+    place = np.tile([0.5, 0.2, 0.0], (60, 1))
+    place[30 : 30 + n] *= -1
+    mended, _ = turned_back(around(place))
+    assert (mended[:, 3] != place).any(axis=1).sum() == n_mirrored
+
+
+def test_with_fewer_than_three_sensors_nothing_is_compared():
+    position = around((-0.9, 0.3, 0.0))
+    is_usable = np.ones((60, 4), bool)
+    is_usable[:, :2] = False
+    mended, found = turned_back(position, is_usable)
+    np.testing.assert_array_equal(mended, position)
+    assert found == []

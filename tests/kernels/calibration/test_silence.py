@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -61,3 +62,55 @@ def test_a_sensor_stuck_for_long_is_an_error(made):
 def test_no_frames():
     empty = Recording(120.0, SENSORS, np.zeros((0, 17, 3)), np.zeros((0, 17, 4)), np.zeros((0, 17), bool))
     assert find_silent(empty)[1] == []
+
+
+def test_a_quarter_of_a_second_of_repeats_is_silence_and_a_frame_less_is_not(perfect):
+    assert find_silent(stuck(perfect, 1000, 1031))[0].sum() == 30
+    assert not find_silent(stuck(perfect, 1000, 1030))[0].any()
+
+
+def test_at_slow_rates_silence_takes_five_repeats(perfect):
+    every = {name: getattr(perfect.recording, name)[::15] for name in ("position_xyz_m", "rotation_wxyz", "is_valid")}
+    slow = SimpleNamespace(recording=replace(perfect.recording, frame_rate_hz=8.0, **every))
+    assert find_silent(stuck(slow, 80, 86))[0].sum() == 5
+    assert not find_silent(stuck(slow, 80, 85))[0].any()
+
+
+def test_a_sensor_that_turns_on_the_spot_is_heard(perfect):
+    held = stuck(perfect, 1000, 1200)
+    assert not find_silent(replace(held, rotation_wxyz=perfect.recording.rotation_wxyz))[0].any()
+
+
+def test_what_is_called_lost_is_not_told_as_silent(perfect):
+    held = stuck(perfect, 1000, 1200)
+    is_valid = held.is_valid.copy()
+    is_valid[1000:1200, HAND] = False
+    assert find_silent(replace(held, is_valid=is_valid))[1] == []
+    zeros = held.position_xyz_m.copy()
+    zeros[1000:1200, HAND] = 0.0
+    assert find_silent(replace(held, position_xyz_m=zeros, is_valid=is_valid))[1] == []
+
+
+def test_repeated_zeros_are_told_once(perfect):
+    held = stuck(perfect, 1000, 1200)
+    held.position_xyz_m[1000:1200, HAND] = 0.0
+    is_silent, found = find_silent(held)
+    assert is_silent.sum() == 200
+    assert len(found) == 1
+    assert "a position of exactly zero in 200 frames from frame 1000 on;" in found[0].sentence
+
+
+def test_one_sensor_that_moves_does_not_make_the_others_silent(perfect):
+    position = perfect.recording.position_xyz_m.copy()
+    position[:200, 3, 0] += np.linspace(0, 1, 200)  # during the T-pose
+    assert not find_silent(replace(perfect.recording, position_xyz_m=position))[0].any()
+
+
+def test_others_that_were_silent_too_are_counted(perfect):
+    held = stuck(perfect, 1000, 1200)
+    for other in (0, 5):
+        held.position_xyz_m[1000:1200, other] = held.position_xyz_m[1000, other]
+        held.rotation_wxyz[1000:1200, other] = held.rotation_wxyz[1000, other]
+    _, found = find_silent(held)
+    assert found[0].sensor == SENSORS[0]
+    assert "(2 other sensors did so too)" in found[0].sentence

@@ -103,6 +103,16 @@ def test_a_slow_bounce_turns_on_beats():
     assert motion_beats(bounce(1.0), 60.0).interval_s == pytest.approx(0.5, rel=0.02)
 
 
+@pytest.mark.parametrize(("bend", "interval_s"), [(0.05, 0.35), (0.2, 0.7)])
+def test_turns_alike_are_beats_each_and_of_turns_unlike_every_second(bend, interval_s):
+    """A swing whose turns to one side are sharper: one and a half times, and many times."""
+    t = np.arange(480) / 60
+    position = np.zeros((480, 3, 3))
+    angle = np.pi * (t - 0.1) / 0.35
+    position[:, 1:, 0] = 0.3 * (np.cos(angle) + bend * np.cos(2 * angle))[:, None]
+    assert motion_beats(position, 60.0).interval_s == pytest.approx(interval_s, rel=0.02)
+
+
 def test_a_beat_is_no_longer_than_its_bound():
     position = swing(interval_s=0.5)
     one = {"extrema_per_beat": 1}
