@@ -16,6 +16,7 @@ import filelock
 from dagster_shared.error import SerializableErrorInfo
 
 from assets.formats import beside
+from assets.formats.errors import FormatError
 from assets.partitions import SESSION, SONG, dagster_key, lake_key
 from pipelines.freshness import Freshness, PartitionState
 from pipelines.jobs import JOB_OF_GROUP, job_of
@@ -27,8 +28,11 @@ from schemas.keys import check_key
 # Stages in order; the groups of one stage run together, clip by clip carried over.
 STAGES: tuple[tuple[str, ...], ...] = (("capture", "motion"), ("music",), ("catalog",), ("search",), ("dance",))
 GROUPS = tuple(JOB_OF_GROUP)
+_PARTITION = "dagster/partition"
 _RANGE_START, _RANGE_END = "dagster/asset_partition_range_start", "dagster/asset_partition_range_end"
 PID_TAG = "odori/pid"
+ASKED_TAG = "odori/asked"
+"""On a run: the version of what was asked of its partition, :meth:`pipelines.freshness.Freshness.asked_version`."""
 FindJob = Callable[[str], dg.JobDefinition]
 """Gives a job by its name."""
 
@@ -294,13 +298,56 @@ def unmade(batch: Batch, state: Freshness) -> set[tuple[str, str]]:
     return left
 
 
-def last_failures(instance: dg.DagsterInstance, *, newest: int = 200) -> dict[tuple[str, str], str]:
-    """Say why partitions failed whose latest run did: (asset, partition) to one sentence."""
+def mark_asked(instance: dg.DagsterInstance, run: dg.DagsterRun, state: Freshness) -> None:
+    """Write on a run of one partition what was asked of it, so that a failure is told of that and of nothing else.
+
+    Sources or settings that cannot be read leave it unmarked: the run says itself what is wrong.
+    """
+    of = _made_in(run)
+    if of is None or not of[0] or ASKED_TAG in run.tags:
+        return
+    try:
+        instance.add_run_tags(run.run_id, {ASKED_TAG: state.asked_version(*of)})
+    except (StudioError, FormatError, OSError):
+        return
+
+
+def _made_in(run: dg.DagsterRun) -> tuple[tuple[str, ...], str] | None:
+    """Name the assets of a run and its partition; None for a range, which is run again one by one where it fails."""
+    if _RANGE_START in run.tags:
+        return None
+    assets = tuple(sorted(asset.to_user_string() for asset in run.asset_selection or ()))
+    return assets, lake_key(run.tags[_PARTITION]) if _PARTITION in run.tags else ""
+
+
+def last_failures(
+    instance: dg.DagsterInstance, state: Freshness, pairs: Collection[tuple[str, str]], *, newest: int = 200
+) -> dict[tuple[str, str], str]:
+    """Say why partitions failed whose latest run for what is asked of them now did.
+
+    A failure belongs to what was asked: once request, settings, code or inputs are others, it is none of theirs.
+
+    Parameters
+    ----------
+    instance : DagsterInstance
+    state : Freshness
+    pairs : (asset, partition) to look for
+    newest : int, > 0
+        How many runs are looked at.
+
+    Returns
+    -------
+    dict
+        (asset, partition) to one sentence, of those that failed.
+    """
     found: dict[tuple[str, str], str] = {}
     statuses = [dg.DagsterRunStatus.FAILURE, dg.DagsterRunStatus.SUCCESS]
-    for run in instance.get_runs(dg.RunsFilter(statuses=statuses), limit=newest):
-        keys = [lake_key(run.tags["dagster/partition"])] if "dagster/partition" in run.tags else [""]
-        if _RANGE_START in run.tags:  # a range that failed was run again one by one
+    for run in instance.get_runs(dg.RunsFilter(statuses=statuses), limit=newest) if pairs else ():
+        assets, key = _made_in(run) or ((), "")
+        wanted = [(asset, key) for asset in assets if (asset, key) in pairs and (asset, key) not in found]
+        if not wanted or not state.assets.keys() >= set(assets):
+            continue
+        if run.tags.get(ASKED_TAG) != state.asked_version(assets, key):
             continue
         reason = ""
         if run.status == dg.DagsterRunStatus.FAILURE:
@@ -311,9 +358,7 @@ def last_failures(instance: dg.DagsterInstance, *, newest: int = 200) -> dict[tu
                 for error in _errors(entry.dagster_event)
             ]
             reason = causes[0] if causes else "the run ended without a reason; see it in 'odori ui'"
-        for asset in run.asset_selection or ():
-            for key in keys:
-                found.setdefault((asset.to_user_string(), key), reason)
+        found |= dict.fromkeys(wanted, reason)
     return {pair: reason for pair, reason in found.items() if reason}
 
 

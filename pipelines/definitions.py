@@ -5,6 +5,7 @@ from typing import Any
 import dagster as dg
 
 from pipelines import jobs, schedules, sensors
+from pipelines.build import mark_asked
 from pipelines.caches import settle
 from pipelines.collection import ASSETS, freshness
 from pipelines.devices import Devices
@@ -29,7 +30,7 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
     made: list[dg.Definitions] = []
     # Made for each run anew: a run keeps to the settings and sources it began with, and its stamps say so.
     resources: dict[str, Any] = {
-        "studio": dg.ResourceDefinition(lambda _: folder.frozen()),
+        "studio": dg.ResourceDefinition(lambda context: _frozen(folder, context)),
         "earlier": EarlierTables(folder.lake),
         "find_job": dg.ResourceDefinition(lambda _: made[0].resolve_job_def),
         "progress": NoProgress(),
@@ -71,6 +72,14 @@ def build_definitions(studio: StudioFolder | None = None, **overrides: Any) -> d
     )
     made.append(definitions)
     return definitions
+
+
+def _frozen(folder: StudioFolder, context: dg.InitResourceContext) -> StudioFolder:
+    """Give the studio as a run begins with it, which is what the run is marked with."""
+    studio = folder.frozen()
+    if context.run is not None and context.instance is not None:
+        mark_asked(context.instance, context.run, freshness(studio))
+    return studio
 
 
 def _devices(known: dict[str, Devices], wanted: str) -> Devices:

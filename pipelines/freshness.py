@@ -274,6 +274,27 @@ class Freshness:
             for k in self._input_keys(node.kind, self.assets[name].kind, name, key)
         }
 
+    def asked_version(self, assets: Collection[str], key: str) -> str:
+        """Version of all that is asked of a partition of assets made in one run, and of what they are made from.
+
+        What one of them is made from that another makes is left out: the version is the same before and after the run.
+        It stays as long as code, settings, request, sources and inputs stay, whatever became of the run.
+        """
+        told = []
+        for asset in sorted(assets):
+            outside = sorted(pair for pair in self.input_pairs(asset, key) if pair[0] not in assets)
+            inputs = [[*pair, stamp.content if (stamp := self.stamp(*pair)) else ""] for pair in outside]
+            told.append(
+                [
+                    asset,
+                    self.assets[asset].code_version_of(key),
+                    self.settings_version(asset, key),
+                    self.source_version(asset, key),
+                    inputs,
+                ]
+            )
+        return source_kinds.fingerprint([key, told])
+
     def _input_keys(self, kind: Kind, of: Kind, name: str, key: str) -> Sequence[str]:
         if of == "whole":
             return [""]

@@ -28,7 +28,7 @@ def requests(
     tried: set[build.Batch] = set()
     given_up: set[tuple[str, str]] = set()
     while batches := build.plan(state, instance, groups=groups, tried=tried, given_up=given_up):
-        asked = [_request(state, instance, batch) for batch in batches]
+        asked = [_request(state, instance, part) for batch in batches for part in batch.without(given_up)]
         new = [request for request in asked if not _has_run(instance, request)]
         if new:
             return new
@@ -62,7 +62,7 @@ def _made_from(state: Freshness, batch: build.Batch) -> list[object]:
             state.inputs(asset, key),
             state.source_version(asset, key),
             state.settings_version(asset, key),
-            state.assets[asset].code_version,
+            state.assets[asset].code_version_of(key),
         ]
         for asset in batch.assets
         for key in batch.keys

@@ -61,11 +61,16 @@ def dance_songs(
     names = {song.key for song in songs}
     if any(METHODS[base_method(chosen)].learns for ways in methods.values() for chosen in ways):
         names |= work.state.sources.performed_songs  # what the dancer danced to is what the model learns from
-    report = work.run(
-        building.GROUPS,
-        keys=lambda kind, key: key in keys if kind == "dance" else key in names if kind == "song" else True,
-        assets=set().union(*(work.state.needed_for(key) for key in keys)),
-    )
+    try:
+        report = work.run(
+            building.GROUPS,
+            keys=lambda kind, key: key in keys if kind == "dance" else key in names if kind == "song" else True,
+            assets=set().union(*(work.state.needed_for(key) for key in keys)),
+        )
+    except StudioError:  # nothing was danced: nobody has asked
+        for key in sorted(keys):
+            studio.remember(key, before.get(key))
+        raise
     state = freshness(studio)
     refused = {f["key"]: f["reason"] for f in songs_of(state, studio) if f["state"] == "refused"}
     made, troubles = [], []

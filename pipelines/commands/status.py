@@ -34,8 +34,11 @@ def status(root: Path, *, devices: bool = False) -> Outcome:
     studio = existing(root)
     state = freshness(studio)
     (clips, doubts), songs = _clips_and_doubts(state, studio), songs_of(state, studio)
-    failures = building.last_failures(building.open_instance(studio)) if studio.dagster_home.is_dir() else {}
-    assets = [_asset_facts(f, state, failures) for f in state.findings()]
+    findings = state.findings()
+    unmade = {(f.asset, f.key) for f in findings if f.state in ("stale", "missing")}
+    is_begun = studio.dagster_home.is_dir()
+    failures = building.last_failures(building.open_instance(studio), state, unmade) if is_begun else {}
+    assets = [_asset_facts(f, state, failures) for f in findings]
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
     notes = list(state.sources.notes)
     facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes, "warnings": doubts}
@@ -44,7 +47,7 @@ def status(root: Path, *, devices: bool = False) -> Outcome:
 
 
 def _asset_facts(finding: PartitionState, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:
-    failure = failures.get((finding.asset, finding.key)) if finding.state in ("stale", "missing") else None
+    failure = failures.get((finding.asset, finding.key))
     return {
         "asset": finding.asset,
         "partition": finding.key,
