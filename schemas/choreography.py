@@ -28,7 +28,12 @@ CHOREOGRAPHY = Table(
         Column("pin_id", pa.string(), "The pin this step serves; null when none.", is_optional=True),
         Column("transition_cost", pa.float32(), "Cost of the seam before the step, by how the poses differ."),
         Column("stay_cost", pa.float32(), "Cost of the seam before the step coming soon after the one before it."),
-        Column("warp_cost", pa.float32(), "Cost of leaving the clip's own pace."),
+        Column(
+            "warp_cost",
+            pa.float32(),
+            "Cost of leaving the clip's own pace: (ln r / ln 1.1)² of the warp ratio r, more outside 0.90 to 1.10, by "
+            "the weights of the method.",
+        ),
         Column("match_cost", pa.float32(), "Cost of rhythm unlike the music's; 0 but on a match's first step."),
         Column("intensity_cost", pa.float32(), "Cost of intensity unlike the music's; 0 but on a match's first step."),
         Column("stride_cost", pa.float32(), "Cost of half- or double-time."),

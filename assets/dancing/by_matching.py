@@ -7,7 +7,7 @@ import numpy as np
 
 from assets.dancing import licences
 from assets.dancing.danced import ChosenSteps, Markdown
-from assets.dancing.match_pieces import LoadedMatches, MatchPiece, load_matches, pieces_of
+from assets.dancing.match_pieces import LoadedMatches, load_matches, pieces_of
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.refusal import RefusalError
 from assets.plots import matching as matching_plots
@@ -15,20 +15,10 @@ from assets.plots.dance import phrase_table
 from assets.reading.clips import named_clips, read_clips
 from assets.stamps import Stored, repeatable
 from kernels.assembly.timing import blend_widths, cover
-from kernels.matching import connect, path
-from kernels.motion.features import at_feature_rate, link_directions, link_weights
-from kernels.motion.velocity import usable_frames
-from kernels.skeleton.canonical import CANONICAL
+from kernels.matching import path
+from kernels.matching.joints import clip_directions, joints_of
 from kernels.types import Choreography, Float
 from schemas.settings import Settings
-
-APART_S = 0.1
-"""Time between two moments of a clip that count as neighbours: pieces connect where they differ no more
-than those. Tuned on real clips: at 0.017 s only a clip itself connects, at 0.2 s over half of all pairs do, with feet
-that visibly slide."""
-
-MARGIN_COST = 0.5
-"""Price of a blend half of which would lie past the clip's end. Chosen by hand."""
 
 
 def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, settings: Settings) -> ChosenSteps:
@@ -65,7 +55,11 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         for ps in pieces
     ]
     limits, joints = joints_of(
-        pieces, spans, canonical_pose, blend_s=settings.dance.blend_s, seam_weight=settings.match_path.seam_weight
+        pieces,
+        spans,
+        directions_of(canonical_pose, set(clip_ids)),
+        blend_s=settings.dance.blend_s,
+        seam_weight=settings.match_path.seam_weight,
     )
     chosen = path.choose(
         candidates,
@@ -123,76 +117,20 @@ def _share(masks: Sequence[Any]) -> float:
     return float(sum(int(m.sum()) for m in masks) / n) if n else 1.0
 
 
-def joints_of(
-    pieces: Sequence[Sequence[MatchPiece]], spans: Float, canonical_pose: Stored, *, blend_s: float, seam_weight: float
-) -> tuple[connect.ConnectionThresholds, list[path.Joint]]:
-    """Compare the ends of all pieces with the starts of the next, and say which connect.
+def directions_of(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str, Float, tuple[float, float]]]:
+    """Take the link directions of the wanted clips, one clip at a time, and the seconds between which each is usable.
 
     Parameters
     ----------
-    pieces : S lists of pieces
-    spans : (S + 1,) float, seconds of the song
     canonical_pose : Stored, poses of clips by session
-    blend_s : float, seconds of song, >= 0
-        A blend that would reach past the usable part of a clip costs more.
-    seam_weight : float, >= 0
-        Cost of two poses as unlike as the limits.
+    wanted : clip_ids
 
-    Returns
-    -------
-    limits : Thresholds, measured in the clips of these pieces
-    joints : S - 1 Joint
+    Yields
+    ------
+    clip_id, and what :func:`kernels.matching.joints.clip_directions` has of it
     """
-    n_links = len(CANONICAL.joints) - 1
-    weight = link_weights(CANONICAL.offset_xyz_m, CANONICAL.parent)
-    half_s = blend_s / 2
-    ends = [_no_poses(len(ps), n_links) for ps in pieces]
-    starts = [_no_poses(len(ps), n_links) for ps in pieces]
-    lacking_end, lacking_start = ([np.zeros(len(ps)) for ps in pieces] for _ in range(2))
-    of_clip: dict[str, list[tuple[int, int]]] = {}
-    for i, ps in enumerate(pieces):
-        for j, piece in enumerate(ps):
-            of_clip.setdefault(piece.clip_id, []).append((i, j))
-    changes = []
-    for clip_id, direction, (first_s, last_s) in _directions(canonical_pose, set(of_clip)):
-        changes.append(connect.own_changes(direction, weight, apart_s=APART_S))
-        here = of_clip[clip_id]
-        own = [pieces[i][j] for i, j in here]
-        pace = np.array(
-            [(p.end_s - p.start_s) / (spans[i + 1] - spans[i]) for (i, _), p in zip(here, own, strict=True)]
-        )
-        at_start = connect.poses_at(direction, np.array([p.start_s for p in own]), pace=pace)
-        at_end = connect.poses_at(direction, np.array([p.end_s for p in own]), pace=pace)
-        for n, (i, j) in enumerate(here):
-            starts[i].direction[j], starts[i].velocity[j] = at_start.direction[n], at_start.velocity[n]
-            ends[i].direction[j], ends[i].velocity[j] = at_end.direction[n], at_end.velocity[n]
-            room = half_s * pace[n]
-            if room > 0:
-                lacking_start[i][j] = max(first_s + room - own[n].start_s, 0.0) / room
-                lacking_end[i][j] = max(own[n].end_s + room - last_s, 0.0) / room
-    limits = connect.calibrate(changes)
-    joints = []
-    for i in range(len(pieces) - 1):
-        pose, speed = connect.differences(ends[i], starts[i + 1], weight)
-        unlike = (pose / limits.pose_rad + speed / limits.speed_rad_per_s) / 2
-        # A blend that reaches past a clip's end stands still there.
-        stands = MARGIN_COST * (lacking_end[i][:, None] + lacking_start[i + 1][None])
-        joints.append(path.Joint(seam_weight * unlike + stands, connect.connects(pose, speed, limits)))
-    return limits, joints
-
-
-def _no_poses(n: int, n_links: int) -> connect.JointPoses:
-    return connect.JointPoses(np.zeros((n, n_links, 3)), np.zeros((n, n_links, 3)))
-
-
-def _directions(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[str, Float, tuple[float, float]]]:
-    """Link directions of the wanted clips at 120 Hz, one clip at a time, and the seconds between which it is usable."""
     for moved in named_clips(canonical_pose, wanted):
-        position = at_feature_rate(moved.position_xyz_m, moved.frame_rate_hz)
-        root = at_feature_rate(moved.rotation_wxyz[:, 0], moved.frame_rate_hz)
-        first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
-        usable_s = first / moved.frame_rate_hz, last / moved.frame_rate_hz
-        yield moved.clip_id, link_directions(position, root, CANONICAL.parent), usable_s
+        yield moved.clip_id, *clip_directions(moved.position_xyz_m, moved.rotation_wxyz[:, 0], moved.frame_rate_hz)
 
 
 def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
@@ -224,7 +162,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
 
 METHOD = Method(
     name="matching",
-    version="5",
+    version="6",
     inputs=(
         *("clip", "canonical_pose", "motion_feature", "motion_beat"),
         *("match", "music_segment", "music_feature"),

@@ -10,31 +10,12 @@ from assets.tables import matching as matching_tables
 from assets.tables import pack
 from assets.tables.matching import Rhythm, StoredMatches
 from kernels.matching import intensity
-from kernels.matching.pieces import ease_pace, longest_first, motion_under, other_starts, snap_start, split_span
-from kernels.matching.score import SCALE_DENOMINATOR, ratios, similarity
-from kernels.motion.features import FEATURE_RATE_HZ
+from kernels.matching.pieces import longest_first, motion_under, other_starts, split_span
+from kernels.matching.price import ClipFeatures, MatchPiece, Place, SongSpan, lay_piece, match_cost
+from kernels.matching.score import ratios, similarity
 from kernels.music.segments import Segments
-from kernels.ranks import rank_correlation
 from kernels.types import Float
-from kernels.warp import EASY_WARP
 from schemas.settings import MatchPathSettings
-
-WARP_COST = 0.1
-"""Price of a warp of 1.1. Chosen by hand, as small beside a seam as the motion graph has it."""
-
-
-@dataclass(frozen=True, eq=False)
-class ClipFeatures:
-    """What the choice asks of a clip: (F,) rhythm and intensity before scaling at 120 Hz, (B,) beats in seconds."""
-
-    rhythm: Rhythm
-    peak_effort: Float
-    beat_s: Float
-
-    @property
-    def duration_s(self) -> float:
-        """Seconds from the first value to the last."""
-        return max(len(self.rhythm) - 1, 0) / FEATURE_RATE_HZ
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,43 +27,6 @@ class LoadedMatches:
     intensity: Float
     matches: Sequence[StoredMatches]
     clips: Mapping[str, ClipFeatures]
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a clip goes with a segment: a match, or another start in the clip of one.
-
-    ``rank_number`` is the match's, ``cost`` what it lacks as a match, 0 to 1 (:func:`match_cost`).
-    """
-
-    clip_id: str
-    rank_number: int
-    numerator: int
-    start_frame_index: int
-    cost: float
-
-
-@dataclass(frozen=True)
-class MatchPiece:
-    """A stretch of a clip a span of the song may be danced with, and its own costs.
-
-    ``start_s`` and ``end_s`` are seconds of the clip; ``rank_number`` is 0 where it fills a span without a match.
-    """
-
-    clip_id: str
-    start_s: float
-    end_s: float
-    rank_number: int
-    match_cost: float
-    intensity_cost: float
-    warp_cost: float
-    is_snapped: bool = False
-    is_easy: bool = True
-
-    @property
-    def cost(self) -> float:
-        """Sum of its own costs."""
-        return self.match_cost + self.intensity_cost + self.warp_cost
 
 
 def load_matches(
@@ -169,12 +113,27 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
         start_s, end_s = float(found.segments.start_s[i]), float(found.segments.end_s[i])
         if matches.clip_ids:
             places = places_of(matches, parts[i], found.clips, most=settings.other_starts)
-            cut = (song_edges, clip_edges)
-            made = [_piece(found, i, place, parts[i], beat_s, cut, settings) for place in places]
+            first = int(found.segments.start_frame_index[i])
+            music = found.intensity[first : first + len(parts[i])]
+            span = SongSpan(start_s, end_s, first, parts[i], music, beat_s)
+
+            def lay(place: Place, span: SongSpan = span, *, eases: bool = False) -> MatchPiece:
+                return lay_piece(
+                    place,
+                    found.clips[place.clip_id],
+                    span,
+                    edges=(song_edges, clip_edges),
+                    match_weight=settings.match_weight,
+                    intensity_weight=settings.intensity_weight,
+                    loss_ratio=settings.snap_loss_ratio,
+                    eases=eases,
+                )
+
+            made = [lay(place) for place in places]
             # Pieces far from their own pace are for segments that have no others.
             easy = [p for p in made if p.is_easy]
             if not easy:
-                made = [_piece(found, i, place, parts[i], beat_s, cut, settings, is_eased=True) for place in places]
+                made = [lay(place, eases=True) for place in places]
                 easy = [p for p in made if p.is_easy]
             every.append(easy or made)
             edges.append(end_s)
@@ -225,75 +184,3 @@ def places_of(matches: StoredMatches, part: Rhythm, clips: Mapping[str, ClipFeat
         Place(matches.clip_ids[rank], rank + 1, int(matches.numerator[rank]), start, cost)
         for (rank, start), cost in zip(found, match_cost(np.array(score), np.array(mutual)).tolist(), strict=True)
     ]
-
-
-def _piece(
-    found: LoadedMatches,
-    segment: int,
-    place: Place,
-    part: Rhythm,
-    beat_s: Float,
-    edges: tuple[Float, Float],
-    settings: MatchPathSettings,
-    *,
-    is_eased: bool = False,
-) -> MatchPiece:
-    """Make one place of a clip a piece, and price it."""
-    segments, clip = found.segments, found.clips[place.clip_id]
-    numerator, start = place.numerator, place.start_frame_index
-    if is_eased:
-        numerator, start = ease_pace(
-            part, clip.rhythm, numerator=numerator, start_frame_index=start, loss_ratio=settings.snap_loss_ratio
-        )
-    frame = snap_start(
-        part,
-        clip.rhythm,
-        numerator=numerator,
-        start_frame_index=start,
-        beat_s=clip.beat_s,
-        loss_ratio=settings.snap_loss_ratio,
-    )
-    scale = numerator / SCALE_DENOMINATOR
-    start_s, end_s = float(segments.start_s[segment]), float(segments.end_s[segment])
-    first = int(segments.start_frame_index[segment])
-    # A segment starts between two frames; the clip's time under it moves along by as much.
-    clip_s = max(frame / FEATURE_RATE_HZ + scale * (start_s - first / FEATURE_RATE_HZ), 0.0)
-    clip_end_s = min(clip_s + scale * (end_s - start_s), clip.duration_s)
-    music = found.intensity[first : first + len(part)]
-    motion = motion_under(clip.peak_effort, len(part), numerator=numerator, start=frame)
-    inside = beat_s[(beat_s > start_s + 0.1) & (beat_s < end_s - 0.1)]
-    cut = np.rint((np.concatenate([[start_s], inside, [end_s]]) - start_s) * FEATURE_RATE_HZ).astype(np.int64)
-    agreement = intensity.agreement(
-        intensity.bhattacharyya(intensity.histogram(music, edges[0]), intensity.histogram(motion, edges[1])),
-        rank_correlation(intensity.beat_means(music, cut), intensity.beat_means(motion, cut)),
-    )
-    warp = (end_s - start_s) / (clip_end_s - clip_s)
-    return MatchPiece(
-        place.clip_id,
-        clip_s,
-        clip_end_s,
-        place.rank_number,
-        settings.match_weight * place.cost,
-        settings.intensity_weight * (1.0 - agreement),
-        WARP_COST * abs(float(np.log(warp))) / float(np.log(1.1)),
-        frame != start,
-        EASY_WARP[0] - 1e-6 <= warp <= EASY_WARP[1] + 1e-6,
-    )
-
-
-def match_cost(score: Float, mutual_ratio: Float) -> Float:
-    """Cost of each place, 0 to 1: half for its rank among them, half for what lacks to an equal rhythm.
-
-    Its rank is the share of the others with a better score, so equal scores cost the same.
-
-    Parameters
-    ----------
-    score : (N,) float, C of each place
-    mutual_ratio : (N,) float, 0 to 1
-
-    Returns
-    -------
-    (N,) float64, 0 to 1
-    """
-    better = np.searchsorted(np.sort(-score), -score)
-    return np.asarray(0.5 * better / max(len(score) - 1, 1) + 0.5 * (1.0 - mutual_ratio), np.float64)

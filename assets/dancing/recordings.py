@@ -20,6 +20,7 @@ from kernels.hmm.viterbi import Spans
 from kernels.matching.path import Candidates, Chosen, continues
 from kernels.motion.velocity import accents, jerk_around, usable_frames
 from kernels.types import Float, Int
+from kernels.warp import warp_cost
 from schemas.settings import HmmPathSettings
 
 
@@ -127,8 +128,8 @@ def choose_recordings(
     seam_costs = np.array([0.0, *(s[a, b] for s, (a, b) in zip(seam, pairs, strict=True))])
     danced = np.array([m[i] for m, i in zip(short, choice, strict=True)], np.int64)
     end = spans.start + spans.length
-    pace = instances.warp_cost(grid_s[end] - grid_s[spans.start], (motions.end_s - motions.start_s)[danced])
-    pace = settings.warp_weight * pace
+    warp = (grid_s[end] - grid_s[spans.start]) / (motions.end_s - motions.start_s)[danced]
+    pace = settings.warp_weight * warp_cost(warp, instances.PACE)
     missed = missed_beats(is_beat, spans.start, end, ends.end_accent[danced])
     costs = {
         "transition_cost": seam_costs,

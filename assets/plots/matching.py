@@ -174,7 +174,7 @@ def chosen(spans: Float, pieces: Sequence[Any], found: Chosen) -> str:
     Parameters
     ----------
     spans : (S + 1,) float, seconds of the song
-    pieces : S pieces, :class:`assets.dancing.by_matching.Piece`
+    pieces : S pieces, :class:`kernels.matching.price.MatchPiece`
     found : Chosen, of S spans
 
     Returns

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kernels.ranks import mean_ranks
 from kernels.types import Float, Int, MotionGraph
-from kernels.warp import EASY_WARP, HARD_WARP, stretch_price
+from kernels.warp import EASY_WARP, HARD_WARP, WarpWeights
 
 
 @dataclass(frozen=True)
@@ -89,26 +89,10 @@ class PathCosts:
                 f"{self.last_resort_ratio}, {self.hard_ratio}, {self.soft_ratio}"
             )
 
-
-def warp_cost(ratio: Float, costs: PathCosts) -> Float:
-    """Price of playing a clip faster or slower.
-
-    Parameters
-    ----------
-    ratio : (...) float, > 0, song time ÷ clip time
-    costs : PathCosts
-
-    Returns
-    -------
-    (...) float64, >= 0
-        ``warp · (ln r / ln 1.1)²``, and outside the soft bounds ``leaving + warp_outside · e`` more, with e the part of
-        the way, in ln r, from the soft bound to the hard one.
-    """
-    stretch = np.log(np.asarray(ratio, np.float64))
-    (soft_low, soft_high), (hard_low, hard_high) = np.log(costs.soft_ratio), np.log(costs.hard_ratio)
-    excess = np.maximum((stretch - soft_high) / (hard_high - soft_high), (soft_low - stretch) / (soft_low - hard_low))
-    smooth = costs.warp * stretch_price(np.asarray(ratio, np.float64))
-    return np.asarray(smooth + np.where(excess > 0, costs.leaving + costs.warp_outside * excess, 0.0), np.float64)
+    @property
+    def warp_weights(self) -> WarpWeights:
+        """What a warp costs, as :func:`kernels.warp.warp_cost` takes it."""
+        return WarpWeights(self.warp, self.leaving, self.warp_outside, self.soft_ratio, self.hard_ratio)
 
 
 def stride_cost(motion_beats: int, music_beats: int, costs: PathCosts) -> float:

@@ -12,10 +12,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.graph.costs import PathCosts, is_within, rough_cost, usage_cost, warp_cost, weight_scale
+from kernels.graph.costs import PathCosts, is_within, rough_cost, usage_cost, weight_scale
 from kernels.graph.program import Move, PathProgram, StepPrice
 from kernels.graph.repetition import spread
 from kernels.types import Choreography, Float, Int, MotionGraph
+from kernels.warp import warp_cost
 
 Mask = NDArray[np.bool_]
 
@@ -279,7 +280,7 @@ def more_than_any(
     """
     n_beats = len(beat_s) - 1
     longest = max(m for m, _ in steps)
-    warp = float(warp_cost(np.array(costs.last_resort_ratio), costs).max())
+    warp = float(warp_cost(np.array(costs.last_resort_ratio), costs.warp_weights).max())
     stride = max(costs.stride * abs(float(np.log2(m / d))) for m, d in steps)
     largest = float(graph.weight.max(initial=0.0))
     roughest = float(rough_cost(graph, costs).max(initial=0.0))
@@ -327,7 +328,7 @@ def _evaluate(program: PathProgram | None, moves: list[Move], costs: PathCosts, 
         has_transition=seams,
         transition_cost=transition,
         stay_cost=stay,
-        warp_cost=warp_cost(ratio, costs),
+        warp_cost=warp_cost(ratio, costs.warp_weights),
         repetition_cost=repetition,
         stride_cost=stride,
         beat_cost=np.array([program.missed[k][u] for _, u, k in moves]),

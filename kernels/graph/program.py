@@ -34,9 +34,9 @@ from kernels.graph.costs import (
     rough_cost,
     stride_cost,
     transition_cost,
-    warp_cost,
 )
 from kernels.types import Float, Int, MotionGraph
+from kernels.warp import warp_cost
 
 Mask = NDArray[np.bool_]
 Move = tuple[int, int, int]
@@ -147,7 +147,9 @@ class PathProgram:
         if self._admissible is not None:
             fits &= self._admissible[beat : beat + music_beats, nodes].all(axis=0)
         cost = np.full(ratio.shape, np.inf)
-        cost[fits] = warp_cost(ratio[fits], self.costs) + self.stride[kind] + self.missed[kind][nodes][fits]
+        cost[fits] = (
+            warp_cost(ratio[fits], self.costs.warp_weights) + self.stride[kind] + self.missed[kind][nodes][fits]
+        )
         if self._interval_price is not None or self._step_price:
             cost += self.wish_cost(beat, kind, nodes)
         if self._outside_price:

@@ -13,11 +13,14 @@ import numpy as np
 
 from kernels.matching.path import viterbi
 from kernels.types import Float, Int
-from kernels.warp import EASY_WARP, stretch_price
+from kernels.warp import EASY_WARP, WarpWeights
 
 HARD_COST = 4.0
 """Added where the pace is beyond the easy bounds: as much as several rough seams. Chosen by hand; cheaper was tried on
 three songs of real clips and left."""
+
+PACE = WarpWeights(leaving=HARD_COST, easy=(EASY_WARP[0] - 1e-9, EASY_WARP[1] + 1e-9))
+"""What leaving a motion's own pace costs: 1 at a tenth, and more beyond the easy bounds, which rounding may touch."""
 
 LONGEST_RUN = 16
 """Longer runs are all alike: a dance is not to be one long quotation where it need not be. Motions, chosen by hand."""
@@ -51,13 +54,6 @@ class Motions:
             return np.zeros(0, np.int64)
         goes_on = (self.clip_index[1:] == self.clip_index[:-1]) & (np.abs(self.start_s[1:] - self.end_s[:-1]) < 1e-6)
         return np.where(np.append(goes_on, False), np.arange(len(self.state)) + 1, -1)
-
-
-def warp_cost(span_s: Float, motion_s: Float) -> Float:
-    """Cost of leaving a motion's own pace: squared, 1 at ten per cent, and more beyond the easy bounds."""
-    warp = span_s / motion_s
-    easy = (warp >= EASY_WARP[0] - 1e-9) & (warp <= EASY_WARP[1] + 1e-9)
-    return np.asarray(stretch_price(warp) + np.where(easy, 0.0, HARD_COST), np.float64)
 
 
 def shortlist(

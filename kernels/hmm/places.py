@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.hmm.durations import LEAST_WARP, MOST_WARP
-from kernels.hmm.instances import Motions, warp_cost
+from kernels.hmm.instances import PACE, Motions
 from kernels.hmm.viterbi import InfeasibleSpansError
 from kernels.types import Float, Int
+from kernels.warp import warp_cost
 
 MISSED_BEAT = 2.0
 """Price of a beat on which the body does not visibly stop. Chosen as by the motion graph (`missed_beat` of its
@@ -80,7 +81,7 @@ def place(
             a, b = np.searchsorted(ranked, [span_s / MOST_WARP, span_s / LEAST_WARP + 1e-12])
             fits = np.sort(order[a:b])
             end = min(k + d, n_intervals)
-            price = warp_weight * warp_cost(np.asarray(span_s), length_s[fits])
+            price = warp_weight * warp_cost(span_s / length_s[fits], PACE)
             at_k = np.full(len(fits), k)
             price = price + missed_beats(is_beat, at_k, at_k + d, accent[fits])
             price = price - (heard[end] - heard[k])[motions.state[fits]]

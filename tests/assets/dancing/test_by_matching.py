@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from assets.dancing.by_matching import by_matching, joints_of
-from assets.dancing.match_pieces import ClipFeatures, LoadedMatches, Piece, match_cost, places_of
+from assets.dancing.by_matching import by_matching, directions_of
+from assets.dancing.match_pieces import LoadedMatches, places_of
 from assets.dancing.refusal import RefusalError
 from assets.tables.matching import StoredMatches
+from kernels.matching.joints import joints_of
+from kernels.matching.price import ClipFeatures, MatchPiece
 from kernels.motion.features import bumps, link_weights
 from kernels.music.segments import Segments
 from kernels.skeleton.canonical import CANONICAL, JOINTS
@@ -22,17 +24,6 @@ def matches(score, mutual):
     return StoredMatches(
         ("a", "b")[:n], np.full(n, 50), np.zeros(n, np.int64), np.array(score), np.ones(n), np.array(mutual)
     )
-
-
-def test_cost_of_a_match_is_its_rank_and_what_lacks_to_equality():
-    np.testing.assert_allclose(
-        match_cost(np.array([9.0, 3.0, 6.0]), np.array([1.0, 0.2, 0.6])), [0, 0.5 + 0.4, 0.25 + 0.2]
-    )
-
-
-def test_equal_scores_cost_the_same():
-    np.testing.assert_allclose(match_cost(np.zeros(3), np.zeros(3)), 0.5)
-    np.testing.assert_allclose(match_cost(np.array([2.0]), np.array([1.0])), 0)
 
 
 def test_other_starts_stand_beside_their_match():
@@ -55,13 +46,14 @@ TURN = np.linspace(0, 2.0, 121)  # half a radian a second
 
 
 def piece(clip, start_s, end_s):
-    return Piece(clip, start_s, end_s, 1, 0.0, 0.0, 0.0)
+    return MatchPiece(clip, start_s, end_s, 1, 0.0, 0.0, 0.0)
 
 
 def joint(poses, before, after, *, span_s=(2.0, 2.0), blend_s=0.4, weight=0.5):
     """What lies between one piece of the first span and one of the second."""
     spans = np.cumsum(np.append(0.0, span_s))
-    limits, (one,) = joints_of([[before], [after]], spans, poses, blend_s=blend_s, seam_weight=weight)
+    clips = directions_of(poses, {before.clip_id, after.clip_id})
+    limits, (one,) = joints_of([[before], [after]], spans, clips, blend_s=blend_s, seam_weight=weight)
     return limits, one.cost[0, 0], one.is_connected[0, 0]
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from assets.dancing.match_pieces import ClipFeatures, LoadedMatches, pieces_of
+from assets.dancing.match_pieces import LoadedMatches, pieces_of
 from assets.tables.matching import StoredMatches
+from kernels.matching.price import ClipFeatures
 from kernels.motion.features import bumps
 from kernels.music.segments import Segments
 from schemas.settings import MatchPathSettings
@@ -84,7 +85,7 @@ def test_where_all_are_far_from_their_pace_they_come_nearer_to_it_if_that_costs_
 @pytest.mark.parametrize("numerator", [46, 50, 55])
 def test_pace_costs_by_its_ratio_whichever_way(song, numerator):
     (piece,) = only(song([("a", numerator, 60)], {"a": clip()}))
-    assert piece.warp_cost == pytest.approx(0.1 * abs(np.log(50 / numerator)) / np.log(1.1))
+    assert piece.warp_cost == pytest.approx(0.1 * (np.log(50 / numerator) / np.log(1.1)) ** 2)
 
 
 def rising(n):

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from kernels.graph.costs import stride_cost, warp_cost
+from kernels.graph.costs import stride_cost
 from kernels.graph.distance import PoseFeatures
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.path import STEPS
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.kinematics import forward
 from kernels.types import MotionGraph
+from kernels.warp import warp_cost
 
 
 @pytest.fixture
@@ -122,7 +123,7 @@ def every_dance():
                     wish = 0.0 if step_price is None or (beat, kind) not in step_price else step_price[beat, kind][node]
                     if np.isinf(wish):
                         continue
-                    step = float(warp_cost(ratio, costs)) + stride_cost(m, d, costs) + wish
+                    step = float(warp_cost(ratio, costs.warp_weights)) + stride_cost(m, d, costs) + wish
                     left = max(costs.stay_beats - stayed - d, 0) / costs.stay_beats * costs.stay
                     on = [(0, end, 0.0, stayed + d), *((1, t, c + left, 0) for t, c in jumps.get(end, []))]
                     dance(

@@ -13,9 +13,9 @@ from kernels.graph.costs import (
     stride_cost,
     transition_cost,
     usage_cost,
-    warp_cost,
     weight_scale,
 )
+from kernels.warp import warp_cost
 
 
 def test_warp_by_hand():
@@ -27,14 +27,14 @@ def test_warp_by_hand():
         0.1 * (np.log(1.25) / np.log(1.1)) ** 2 + 2 + 4,
         0.1 * (np.log(ratio[3]) / np.log(1.1)) ** 2 + 2 + 8,
     ]
-    np.testing.assert_allclose(warp_cost(ratio, costs), expected)
+    np.testing.assert_allclose(warp_cost(ratio, costs.warp_weights), expected)
 
 
 def test_warp_grows_away_from_the_clips_pace_and_jumps_at_the_soft_bound():
     costs = PathCosts()
     for ratio in (np.linspace(1, 3, 400), np.linspace(1, 0.3, 400)):
-        assert (np.diff(warp_cost(ratio, costs)) > 0).all()
-    inside, outside = warp_cost(np.array([0.9001, 0.8999]), costs)
+        assert (np.diff(warp_cost(ratio, costs.warp_weights)) > 0).all()
+    inside, outside = warp_cost(np.array([0.9001, 0.8999]), costs.warp_weights)
     assert inside <= 0.15
     assert outside - inside > costs.leaving
 
@@ -171,9 +171,9 @@ def test_the_weight_of_a_poor_seam_is_the_costs_own_else_the_graphs_else_one(mak
 
 def test_a_warp_on_its_soft_bound_is_inside(make_graph):
     costs = PathCosts(warp=0.0)
-    on, past = warp_cost(np.array([1.1, 1.1001]), costs)
+    on, past = warp_cost(np.array([1.1, 1.1001]), costs.warp_weights)
     assert on == 0
     assert past >= costs.leaving
-    low_on, low_past = warp_cost(np.array([0.9, 0.8999]), costs)
+    low_on, low_past = warp_cost(np.array([0.9, 0.8999]), costs.warp_weights)
     assert low_on == 0
     assert low_past >= costs.leaving

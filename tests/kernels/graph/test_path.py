@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kernels.graph.costs import PathCosts, stride_cost, warp_cost
+from kernels.graph.costs import PathCosts, stride_cost
 from kernels.graph.path import STEPS, InfeasiblePathError, find_path, to_choreography
+from kernels.warp import warp_cost
 
 NO_USAGE = PathCosts(usage=0.0)
 
@@ -40,7 +41,7 @@ def brute_force(graph, beat_s, costs=NO_USAGE, steps=STEPS, starts=None, admissi
                 if not low <= ratio <= high:
                     continue
                 outside = not costs.hard_ratio[0] <= ratio <= costs.hard_ratio[1]
-                price = seam + float(warp_cost(ratio, costs)) + stride_cost(m, d, costs)
+                price = seam + float(warp_cost(ratio, costs.warp_weights)) + stride_cost(m, d, costs)
                 if graph.accent is not None:
                     price += costs.missed_beat * (d - graph.accent[end])
                 dance(beat + d, [(end, 0.0), *jumps.get(end, [])], n_outside + outside, cost + price)
@@ -70,7 +71,7 @@ def check_legal(path, graph, beat_s, costs=NO_USAGE, steps=STEPS):
         assert moved == (path.transition_cost[i] > 0)
     ratio = (beat_s[ends] - beat_s[path.beat_index]) / (graph.time_s[path.end_node] - graph.time_s[path.source_node])
     np.testing.assert_allclose(path.warp_ratio, ratio)
-    np.testing.assert_allclose(path.warp_cost, warp_cost(ratio, costs))
+    np.testing.assert_allclose(path.warp_cost, warp_cost(ratio, costs.warp_weights))
     low, high = costs.hard_ratio
     np.testing.assert_array_equal(path.is_outside, (ratio < low * (1 - 1e-9)) | (ratio > high * (1 + 1e-9)))
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from kernels.hmm.instances import HARD_COST, Motions, choose, shortlist, warp_cost
+from kernels.hmm.instances import HARD_COST, PACE, Motions, choose, shortlist
+from kernels.warp import warp_cost
 
 
 def motions():
@@ -45,9 +46,9 @@ def test_a_step_without_any_motion_is_refused():
 
 
 def test_pace_costs():
-    assert warp_cost(0.5, np.array([0.5]))[0] == 0
-    assert warp_cost(0.55, np.array([0.5]))[0] == pytest.approx(1.0)
-    assert warp_cost(0.6, np.array([0.5]))[0] > 5
+    assert warp_cost(0.5 / np.array([0.5]), PACE)[0] == 0
+    assert warp_cost(0.55 / np.array([0.5]), PACE)[0] == pytest.approx(1.0)
+    assert warp_cost(0.6 / np.array([0.5]), PACE)[0] > 5
 
 
 def test_the_cheapest_sequence_without_repetition_priced():
@@ -79,9 +80,9 @@ def test_only_a_motion_that_starts_where_one_ends_in_its_own_clip_goes_on():
 def test_a_pace_is_easy_up_to_its_bounds_and_beyond_them_costs_more():
     length = np.ones(1)
     for span in (0.9, 1.1):
-        assert warp_cost(span, length)[0] == pytest.approx((np.log(span) / np.log(1.1)) ** 2)
+        assert warp_cost(span / length, PACE)[0] == pytest.approx((np.log(span) / np.log(1.1)) ** 2)
     for span in (0.899, 1.101):
-        assert warp_cost(span, length)[0] == pytest.approx((np.log(span) / np.log(1.1)) ** 2 + HARD_COST)
+        assert warp_cost(span / length, PACE)[0] == pytest.approx((np.log(span) / np.log(1.1)) ** 2 + HARD_COST)
 
 
 def test_a_motion_shown_very_often_costs_no_more():

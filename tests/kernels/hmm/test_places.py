@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.hmm.instances import Motions, warp_cost
+from kernels.hmm.instances import PACE, Motions
 from kernels.hmm.places import (
     CROWDED,
     MISSED_BEAT,
@@ -16,6 +16,7 @@ from kernels.hmm.places import (
     place,
 )
 from kernels.hmm.viterbi import InfeasibleSpansError
+from kernels.warp import warp_cost
 
 
 def test_beats_passed_and_beats_ended_on():
@@ -59,10 +60,10 @@ def test_a_motion_stands_where_its_pace_is_within_the_hard_bounds():
     grid, none = 0.5 * np.arange(3), np.zeros(3, bool)
     places = place(motions, grid, np.zeros((1, 1)), longest=2, is_beat=none, accent=np.zeros(n))
     assert places.at[0][0][0].tolist() == [1, 2, 3]
-    np.testing.assert_allclose(places.at[0][0][1], warp_cost(np.array(0.5), length[1:4]))
+    np.testing.assert_allclose(places.at[0][0][1], warp_cost(0.5 / length[1:4], PACE))
     assert places.at[0][1][0].tolist() == []
     light = place(motions, grid, np.zeros((1, 1)), longest=1, is_beat=none, accent=np.zeros(n), warp_weight=0.5)
-    np.testing.assert_allclose(light.at[0][0][1], 0.5 * warp_cost(np.array(0.5), length[1:4]))
+    np.testing.assert_allclose(light.at[0][0][1], 0.5 * warp_cost(0.5 / length[1:4], PACE))
 
 
 def test_a_place_pays_for_beats_passed_and_for_the_music_under_it_as_far_as_the_song_goes():
