@@ -46,3 +46,35 @@ def test_no_evidence_no_bars(probability):
 def test_refuses_what_is_no_probability():
     with pytest.raises(ValueError, match="0 to 1"):
         count_bars(np.array([0.5, 1.5]))
+
+
+@pytest.mark.parametrize("meter", [2, 3, 4, 5, 7])
+def test_two_bars_are_enough_to_count(meter):
+    bar, place = count_bars(looks(2 * meter, meter, 0.9, 0.05))
+    np.testing.assert_array_equal(place, np.tile(np.arange(meter) + 1, 2))
+    np.testing.assert_array_equal(bar, np.repeat([1, 2], meter))
+    assert count_bars(looks(3, 2, 0.9, 0.05))[1].tolist() == [0, 0, 0]
+
+
+def test_a_bar_of_odd_length_starts_the_count_anew():
+    """Two beats more in the middle of a song in four."""
+    probability = np.concatenate([looks(24, 4), looks(2, 4), looks(24, 4)])
+    _, place = count_bars(probability)
+    assert place[:24].tolist() == [1, 2, 3, 4] * 6
+    assert place[26:].tolist() == [1, 2, 3, 4] * 6
+
+
+def test_where_two_meters_explain_a_song_alike_the_commoner_is_counted():
+    """Downbeats every twelve beats say as much for three as for four."""
+    assert count_bars(looks(48, 12, 0.6, 0.3))[1].max() == 4
+
+
+def test_a_count_hardly_better_than_the_next_is_none():
+    assert count_bars(looks(64, 4, 0.31, 0.3))[1].tolist() == [0] * 64
+    assert count_bars(looks(64, 4, 0.5, 0.3))[1].max() == 4
+
+
+def test_probabilities_of_nothing_and_of_certainty_are_taken_as_nearly_so():
+    certain = looks(32, 4, 1.0, 0.0)
+    certain[8] = 0.0  # one downbeat that was not heard at all
+    np.testing.assert_array_equal(count_bars(certain)[1], np.arange(32) % 4 + 1)

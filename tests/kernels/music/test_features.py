@@ -77,3 +77,60 @@ def test_onsets_are_gathered_near_beats_only():
 def test_a_sample_that_is_no_number_is_refused():
     with pytest.raises(ValueError, match="not finite"):
         onset_strength(np.array([0.0, np.nan] * 4000), RATE_HZ)
+
+
+def test_a_song_that_starts_with_a_sound_has_an_onset_there():
+    tone = np.sin(2 * np.pi * 440 * np.arange(RATE_HZ) / RATE_HZ)
+    onset = onset_strength(tone, RATE_HZ)
+    assert onset[0] > 0
+    assert onset[:3].max() == onset.max()
+    assert not onset_strength(np.zeros(RATE_HZ), RATE_HZ).any()
+    assert len(onset_strength(np.zeros(0), RATE_HZ)) == 0
+
+
+def test_onsets_within_seven_hundredths_of_a_beat_are_its_own():
+    onset = np.zeros(300)
+    onset[[93, 107]] = 5.0, 6.0
+    assert gather(onset, np.array([1.0])).tolist() == [6.0]
+    onset[107] = 0.0
+    assert gather(onset, np.array([1.0])).tolist() == [5.0]
+    onset[92], onset[93] = 5.0, 0.0
+    assert gather(onset, np.array([1.0])).tolist() == [0.0]
+
+
+def test_a_beat_weaker_than_a_fiftieth_of_the_strongest_onset_is_silence():
+    onset = np.zeros(400)
+    onset[[100, 200, 300]] = 100.0, 2.0, 1.9
+    assert gather(onset, np.array([1.0, 2.0, 3.0])).tolist() == [100.0, 2.0, 0.0]
+
+
+def test_beats_before_the_first_frame_and_after_the_last_gather_what_is_there():
+    onset = np.zeros(100)
+    onset[[0, 99]] = 3.0, 4.0
+    assert gather(onset, np.array([-0.05, -0.2, 1.05, 1.2])).tolist() == [3.0, 0.0, 4.0, 0.0]
+
+
+def test_levels_forty_decibels_below_the_loudest_are_no_intensity():
+    tone = np.sin(2 * np.pi * 1000 * np.arange(6 * RATE_HZ) / RATE_HZ)
+    tone[2 * RATE_HZ : 4 * RATE_HZ] *= 10 ** (-30 / 20)
+    tone[4 * RATE_HZ :] *= 10 ** (-45 / 20)
+    found = music_features(tone, RATE_HZ, beat_s=np.zeros(0), duration_s=6.0)
+    assert found.intensity[120] == pytest.approx(1.0, abs=0.01)
+    assert found.intensity[360] == pytest.approx(0.25, abs=0.01)
+    assert found.intensity[600] == 0
+
+
+def test_a_song_below_sixty_decibels_is_silent():
+    tone = np.sin(2 * np.pi * 1000 * np.arange(2 * RATE_HZ) / RATE_HZ)
+    how = {"beat_s": np.zeros(0), "duration_s": 2.0}
+    assert not music_features(10 ** (-58 / 20) * tone, RATE_HZ, **how).intensity.any()
+    assert music_features(10 ** (-56 / 20) * tone, RATE_HZ, **how).intensity.any()
+
+
+def test_a_song_told_longer_than_its_sound_goes_on_at_its_last_level():
+    tone = np.sin(2 * np.pi * 1000 * np.arange(RATE_HZ) / RATE_HZ)
+    found = music_features(tone, RATE_HZ, beat_s=np.zeros(0), duration_s=1.5)
+    assert len(found.intensity) == len(found.rhythm) == 181
+    assert (found.intensity[125:] == found.intensity[124]).all()
+    assert found.intensity[-1] > 0
+    assert found.time_s[-1] == 1.5

@@ -50,3 +50,35 @@ def test_refusals():
         key_levels(np.zeros(5), 0, frame_rate_hz=50)
     with pytest.raises(ValueError, match="samples"):
         key_levels(np.zeros((2, 2, 2)), RATE, frame_rate_hz=50)
+
+
+def test_keys_above_the_nyquist_frequency_are_not_heard():
+    level = key_levels(chord([57], 1.0, 2000), 2000, frame_rate_hz=50)
+    above = 440.0 * 2.0 ** ((np.arange(LOWEST_KEY, LOWEST_KEY + 60) - 69) / 12.0) > 1100
+    assert above.any()
+    assert not level[:, above].any()
+    assert level[25, 57 - LOWEST_KEY] > 0
+
+
+def test_a_change_of_bass_alone_is_seen_in_the_bass():
+    samples = np.concatenate([chord([40, 64, 67, 71], 2.0), chord([45, 64, 67, 71], 2.0)])
+    change = harmony_changes(key_levels(samples, RATE, frame_rate_hz=50), frame_rate_hz=50)[95:106].max(axis=0)
+    assert change[2] > 2 * change[0]
+    assert change[3] > 2 * change[1]
+
+
+def test_the_same_chord_an_octave_up_is_no_change_of_pitch_classes():
+    samples = np.concatenate([chord([60, 64, 67], 2.0), chord([72, 76, 79], 2.0)])
+    change = harmony_changes(key_levels(samples, RATE, frame_rate_hz=50), frame_rate_hz=50)
+    assert change[95:106, :2].max() < 0.1
+
+
+def test_too_quiet_to_hear_is_silence():
+    assert not key_levels(1e-7 * chord([57], 1.0), RATE, frame_rate_hz=50).any()
+    assert key_levels(1e-3 * chord([57], 1.0), RATE, frame_rate_hz=50).any()
+
+
+def test_a_rate_of_frames_that_cannot_be_is_refused():
+    for bad in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="frame_rate_hz"):
+            key_levels(np.zeros(5), RATE, frame_rate_hz=bad)

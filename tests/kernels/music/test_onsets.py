@@ -82,3 +82,33 @@ def test_channels_are_averaged():
 def test_refusals(samples, rate, said):
     with pytest.raises(ValueError, match=said):
         band_levels(samples, rate)
+
+
+def test_too_quiet_to_hear_is_silence():
+    assert not band_levels(1e-7 * tone(440), RATE)[0].any()
+    assert band_levels(1e-4 * tone(440), RATE)[0].max() == pytest.approx(np.log(1001))
+
+
+@pytest.mark.parametrize("rate", [200, 4000, 22050])
+def test_bands_fit_under_the_nyquist_frequency(rate):
+    level, centre_hz = band_levels(np.ones(rate), rate)
+    assert level.shape[1] == len(centre_hz) >= 1
+    assert (centre_hz < max(rate / 2, 60.0)).all()
+
+
+def test_a_rise_is_measured_over_two_frames_against_the_loudest_neighbour():
+    level = np.zeros((4, 3))
+    level[2:] = [0.0, 2.0, 5.0]
+    rise = flux(level)
+    assert rise[:2].tolist() == [[0.0] * 3] * 2
+    assert rise[2].tolist() == [0.0, 2.0, 5.0]
+    level[0] = [0.0, 0.0, 4.0]
+    assert flux(level)[2].tolist() == [0.0, 0.0, 1.0]  # the middle band rose less than its neighbour had been
+    level[0] = [1.5, 0.0, 0.0]
+    assert flux(level)[2].tolist() == [0.0, 0.5, 5.0]
+
+
+def test_no_channel_is_refused_and_one_is_the_sound():
+    np.testing.assert_array_equal(to_mono(tone(440)[:, None]), to_mono(tone(440)))
+    with pytest.raises(ValueError, match="samples"):
+        to_mono(np.zeros((3, 0)))

@@ -5,12 +5,14 @@ import pytest
 
 from kernels.music.notes import sorted_notes
 from kernels.music.percussion import (
+    BAND_OF_KEY,
     CONTOUR,
     FIRST_KEY,
     HIGH,
     LOW,
     MIDDLE,
     N_KEYS,
+    NEAREST_KEY,
     Hits,
     band_hits,
     banded,
@@ -141,3 +143,46 @@ def test_a_band_stands_for_all_its_drums():
     log_p = np.log(np.random.default_rng(0).dirichlet(np.ones(N_KEYS), 2))
     total = sum(np.exp(banded(log_p)[:, key - FIRST_KEY]) for key in (LOW, MIDDLE, HIGH))
     np.testing.assert_allclose(total, 1.0)
+
+
+def test_a_leap_is_more_than_four_semitones():
+    found = contour(notes((0, 60, 1, 1), (1, 64, 1, 1), (2, 69, 1, 1), (3, 65, 1, 1), (4, 60, 1, 1)))
+    assert [CONTOUR[s] for s in found.symbol] == ["step up", "leap up", "step down", "leap down"]
+
+
+def test_notes_within_three_hundredths_are_one_chord():
+    found = contour(notes((0.0, 60, 1, 1), (0.02, 67, 1, 1), (1.0, 62, 1, 1)))
+    assert found.time_s.tolist() == [1.0]
+    assert [CONTOUR[s] for s in found.symbol] == ["leap down"]
+    assert len(contour(notes((0.0, 60, 1, 1), (0.04, 67, 1, 1), (1.0, 62, 1, 1))).time_s) == 2
+
+
+def test_two_onsets_of_a_band_lie_a_tenth_of_a_second_apart():
+    loud = burst([0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5], 800.0)
+    once = band_hits(loud, 22050)
+    double = band_hits(loud + np.roll(loud, int(0.05 * 22050)), 22050)
+    middle = double.time_s[double.key_number == MIDDLE]
+    assert len(middle) == (once.key_number == MIDDLE).sum() == 7
+    assert np.diff(middle).min() >= 0.1 - 1e-9
+
+
+def test_velocities_are_of_the_rise_of_each_band():
+    sound = burst([0.5, 1.5], 800.0)
+    sound[22050 : 2 * 22050] *= 0.05
+    hits = band_hits(sound, 22050)
+    velocity = hits.velocity[hits.key_number == MIDDLE]
+    assert velocity.max() == 127
+    assert velocity[0] > velocity[-1] >= 1
+
+
+def test_of_equally_loud_symbols_the_lowest_key_is_kept():
+    hits = Hits(np.array([0.1, 0.2, 0.3]), np.array([49, 38, 42]), np.array([90, 90, 90]))
+    one = loudest_in(hits, np.array([0.0, 1.0]))
+    assert np.argwhere(one).tolist() == [[0, 38 - FIRST_KEY]]
+
+
+def test_every_sound_a_pad_becomes_is_one_of_general_midi():
+    assert set(NEAREST_KEY.values()) <= set(range(FIRST_KEY, FIRST_KEY + N_KEYS))
+    assert not set(NEAREST_KEY) & set(range(FIRST_KEY, FIRST_KEY + N_KEYS))
+    assert set(BAND_OF_KEY.tolist()) == {LOW, MIDDLE, HIGH}
+    assert [int(BAND_OF_KEY[key - FIRST_KEY]) for key in (LOW, MIDDLE, HIGH)] == [LOW, MIDDLE, HIGH]

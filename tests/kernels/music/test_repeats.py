@@ -78,3 +78,50 @@ def test_what_cannot_be_is_refused():
 def test_it_repeats_to_the_bit(song):
     feature = song("abcbab")
     assert spans(find_repeats(feature)) == spans(find_repeats(feature.copy()))
+
+
+def test_a_part_played_again_and_again_never_overlaps_what_it_repeats(song):
+    found = find_repeats(song("aaaa"))
+    assert found
+    for r in found:
+        assert r.last - r.first <= r.first - r.source
+    assert found[0].source == 0
+
+
+def test_sixteen_beats_are_a_part_and_fifteen_are_not(song):
+    (found,) = find_repeats(song("bb", beats=16, noise=0.05))
+    assert (found.first, found.last, found.source) == (16, 32, 0)
+    assert find_repeats(song("bb", beats=15, noise=0.05)) == []
+    assert len(find_repeats(song("bb", beats=15, noise=0.05), least_beats=15)) == 1
+
+
+def test_only_music_alike_enough_comes_again(song):
+    feature = song("abcb", noise=0.5)
+    (found,) = find_repeats(feature)
+    assert 0.65 <= found.likeness < 0.9
+    assert find_repeats(feature, alike=0.95) == []
+
+
+def test_a_held_note_inside_a_part_that_comes_again_does_not_break_it(song):
+    """Fewer than half of any eight beats stand still: the part is lively enough."""
+    feature = song("ab", beats=40, noise=0.05)
+    feature[10:13] = feature[10]
+    feature[40:] = feature[:40]
+    (found,) = find_repeats(feature)
+    assert (found.first, found.last) == (40, 80)
+    feature[5:35] = feature[5]
+    feature[45:75] = feature[5]
+    assert all(r.last - r.first < 40 for r in find_repeats(feature))
+
+
+def test_of_two_sources_as_good_the_earlier_is_repeated(song):
+    found = find_repeats(song("bcbdb", noise=0.0))
+    assert [r.source for r in found] == [0, 0]
+
+
+@pytest.mark.parametrize(("least_beats", "alike"), [(0, 0.5), (16, 0.0), (16, 1.1)])
+def test_limits_that_cannot_be_are_refused(least_beats, alike):
+    with pytest.raises(ValueError, match="least_beats, alike"):
+        find_repeats(np.ones((40, 2)), least_beats=least_beats, alike=alike)
+    with pytest.raises(ValueError, match=r"\(K, D\)"):
+        find_repeats(np.ones(40))
