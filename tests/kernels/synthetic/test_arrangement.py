@@ -1,5 +1,9 @@
 """The made-up band keeps its own time."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -44,6 +48,25 @@ def test_same_state_same_song():
     one, same = (arrange(np.random.default_rng(11)) for _ in range(2))
     assert one.notes.start_s.tobytes() == same.notes.start_s.tobytes()
     assert one.notes.start_s.tobytes() != arrange(np.random.default_rng(12)).notes.start_s.tobytes()
+
+
+def test_the_same_song_in_every_process():
+    """Whatever order a process gives to sets of names."""
+    code = (
+        "import numpy as np; from kernels.synthetic.arrangement import arrange; "
+        "print([round(float(arrange(np.random.default_rng(i)).notes.start_s.sum()), 6) for i in range(4)])"
+    )
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2", "3")
+    }
+    assert len(said) == 1
 
 
 @pytest.mark.parametrize("how", [{"duration_s": 0}, {"tempo_bpm": -1}])
