@@ -194,12 +194,12 @@ def test_hips_sink_with_feet_held_apart_so_that_knees_keep_their_bend(bend_rad):
     assert np.abs(held.root_xyz_m[:, 1] - mixed.root_xyz_m[:, 1]).max() > 0.004
 
 
-def turned_in_place(angle_rad, *, is_blend):
+def turned_in_place(angle_rad, *, is_blend, facing_rad=0.0):
     """A standing body that turns about the vertical within 0.4 s, on flat planted feet; rate 60."""
     mixed, planted = held_apart(0.0)
     share = np.clip((mixed.time_s - 1.3) / 0.4, 0, 1)
     local = mixed.rotation_wxyz.copy()
-    local[:, 0] = rotation.mul(rotation.from_heading(angle_rad * share**2 * (3 - 2 * share)), local[:, 0])
+    local[:, 0] = rotation.mul(rotation.from_heading(facing_rad + angle_rad * share**2 * (3 - 2 * share)), local[:, 0])
     position, _ = kinematics.forward(CANONICAL, mixed.root_xyz_m, local)
     lineage = mixed.lineage if is_blend else replace(mixed.lineage, blend_weight=np.zeros(len(local)))
     return replace(mixed, rotation_wxyz=local, position_xyz_m=position, lineage=lineage), planted
@@ -218,6 +218,13 @@ def test_flat_feet_do_not_turn_through_a_blend_but_do_as_their_clip_does():
     assert np.abs(foot_turn_rad(lock_feet(through, planted).position_xyz_m)).max() < 0.02
     within, _ = turned_in_place(0.2, is_blend=False)
     np.testing.assert_allclose(foot_turn_rad(lock_feet(within, planted).position_xyz_m), 0.2, atol=0.01)
+
+
+def test_feet_that_turn_past_the_back_do_not_go_all_the_way_round():
+    through, planted = turned_in_place(0.2, is_blend=True, facing_rad=np.pi - 0.1)
+    held = lock_feet(through, planted)
+    assert np.abs(foot_turn_rad(held.position_xyz_m)).max() < 0.02
+    assert np.abs(held.position_xyz_m - through.position_xyz_m)[:, grounding.TOES].max() < 0.05
 
 
 def test_feet_on_their_heels_turn_freely_through_a_blend():

@@ -404,3 +404,52 @@ def test_starts_that_are_no_nodes_are_refused(make_graph, starts):
     graph = make_graph([[0, 0.5], [0, 0.5]], [(0, 3, 1.0)], both_ways=True)
     with pytest.raises(ValueError, match="starts: want 0 <= node < "):
         find_path(graph, 0.5 * np.arange(3), starts=np.array(starts))
+
+
+@pytest.mark.parametrize("kind", ["stretch_price", "interval_price", "step_price"])
+def test_fewest_outside_before_any_wish(make_graph, kind):
+    """One step outside the bounds at whatever a wish makes of it, rather than two for nothing."""
+    graph = make_graph([[0.0, 0.7, 1.2, 1.7], [0.0, 0.7, 1.4, 1.9]])
+    dear = np.where(graph.clip_index == 0, 1e7, 0.0)
+    price = {
+        "stretch_price": dear,
+        "interval_price": np.tile(dear, (3, 1)),
+        "step_price": {(0, 0): dear},
+    }[kind]
+    path = find_path(graph, 0.5 * np.arange(4), steps=((1, 1),), costs=NO_USAGE, **{kind: price})
+    assert path.is_outside.sum() == 1
+    assert (graph.clip_index[path.source_node] == 0).all()
+
+
+def test_forbidden_steps_do_not_count_as_the_dearest(make_graph):
+    graph = make_graph([[0.0, 0.7, 1.2, 1.7]])
+    forbidden = {(0, 0): np.array([1.0, np.inf, np.inf, np.inf])}
+    path = find_path(graph, 0.5 * np.arange(4), steps=((1, 1),), costs=NO_USAGE, step_price=forbidden)
+    assert np.isfinite(path.total_cost)
+    assert path.wish_cost.tolist() == [1.0, 0.0, 0.0]
+
+
+def test_starts_given_twice_and_out_of_order_are_the_same(make_graph):
+    graph = make_graph([0.5 * np.arange(5), 0.5 * np.arange(5)])
+    one, other = (find_path(graph, 0.5 * np.arange(4), starts=s) for s in (np.array([5, 0, 5]), np.array([0, 5])))
+    np.testing.assert_array_equal(one.source_node, other.source_node)
+
+
+def test_the_first_step_pays_for_no_transition_even_where_one_would_be_cheaper(make_graph):
+    """The song begins where it begins: a jump before its first step is none, however dear the clip there."""
+    graph = make_graph([0.5 * np.arange(4), 0.5 * np.arange(4)], [(0, 4, 0.0)], both_ways=False)
+    dear = np.where(graph.clip_index == 0, 5.0, 0.0)
+    path = find_path(graph, 0.5 * np.arange(4), starts=np.array([0]), stretch_price=dear, costs=PathCosts(seam=0.1))
+    assert path.source_node[0] == 0
+    assert not path.has_transition[0]
+
+
+def test_no_rounds_leave_a_dance_that_shows_the_same_again(make_graph):
+    graph = make_graph([0.5 * np.arange(5)] * 2, [(4, 0, 1.0), (4, 5, 1.5), (9, 0, 1.5)], both_ways=False)
+    beat_s = 0.5 * np.arange(13)
+    asked = {"starts": np.array([0]), "costs": PathCosts(jump_back=0.0)}
+    once, spread = (find_path(graph, beat_s, rounds=rounds, **asked) for rounds in (0, 3))
+    assert set(once.source_node.tolist()) == {0, 1, 2, 3}
+    assert spread.total_cost < once.total_cost
+    with pytest.raises(ValueError, match="rounds"):
+        find_path(graph, beat_s, rounds=-1)

@@ -339,3 +339,13 @@ def test_a_half_time_pin_covers_both_of_its_beats(make_graph):
     for interval in range(8):
         assert reach.fits(Pin("p", interval, interval + 1, np.ones(6, bool)))
     assert not reach.fits(Pin("p", 0, 1, np.arange(6) == 5))
+
+
+def test_the_same_nodes_without_their_steps_are_no_other_choice(make_graph):
+    """A pose that cannot be shown in time is not answered by the same clip without the pose."""
+    graph = make_graph([np.arange(8) * 0.5])
+    reach = reach_of(graph, np.arange(8) * 0.5, np.array([0]))
+    far = np.where(np.arange(8) == 7, 0.0, np.inf)
+    pin = Pin("pose", 2, 3, np.ones(8, bool), pose_steps(graph, 2, far, 7))
+    conflict = find_conflict(reach, [pin], choices=[{"the same": np.ones(8, bool), "all but one": np.arange(8) != 5}])
+    assert [way.choice for way in conflict.ways_out] == ["all but one"]

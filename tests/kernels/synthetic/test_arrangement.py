@@ -54,7 +54,7 @@ def test_the_same_song_in_every_process():
     """Whatever order a process gives to sets of names."""
     code = (
         "import numpy as np; from kernels.synthetic.arrangement import arrange; "
-        "print([round(float(arrange(np.random.default_rng(i)).notes.start_s.sum()), 6) for i in range(4)])"
+        "print([round(float(arrange(np.random.default_rng(i)).notes.start_s.sum()), 6) for i in range(10)])"
     )
     said = {
         subprocess.run(
@@ -64,7 +64,7 @@ def test_the_same_song_in_every_process():
             text=True,
             check=True,
         ).stdout
-        for seed in ("1", "2", "3")
+        for seed in ("1", "5")
     }
     assert len(said) == 1
 
