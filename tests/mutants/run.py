@@ -125,6 +125,8 @@ def judge(mutant: draw.Mutant, known: Reach, *, most_s: float, files: int) -> di
             continue
         reached += len(chosen)
         ended = run(mutant.path, source, chosen, spent)
+        if ended.code in (4, 5):  # tests are named for what the mutant changed
+            ended = run(mutant.path, source, [test_file], sum(t[0] for t in known.of(test_file)["tests"].values()))
         if ended.code in (1, 2, 3):
             by = ended.failed or ended.running
             return {"verdict": "killed", "by": by, "s": round(known.of(test_file)["tests"].get(by, [0.0])[0], 1)}

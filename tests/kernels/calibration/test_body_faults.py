@@ -79,3 +79,15 @@ def test_a_sensor_that_is_not_on_the_body_is_an_error(made):
 
 def test_there_is_a_movement_for_every_joint():
     assert len({move_to_repeat(name) for name in SENSORS[1:]}) == 9
+
+
+@pytest.mark.parametrize(
+    ("n_frames", "severity", "want"), [(239, "error", "want at least 240 frames"), (240, "warning", "want 960 frames")]
+)
+def test_few_good_frames_of_a_joint_are_told(cleaned, pairs, n_frames, severity, want):
+    weight = pairs[0].weight.copy()
+    weight[np.flatnonzero(weight > 0)[n_frames:]] = 0.0
+    found = find_body_faults(cleaned, [replace(pairs[0], weight=weight), *pairs[1:]])
+    assert [(one.severity, want in one.sentence, f"got {n_frames}" in one.sentence) for one in found] == [
+        (severity, True, True)
+    ]

@@ -25,6 +25,7 @@ def test_a_reading_repeated_while_the_body_moves_is_none(perfect):
     np.testing.assert_array_equal(is_silent, want)
     assert [(one.severity, one.sensor, one.frame_index) for one in found] == [("warning", "l_hand", 1001)]
     assert "199 frames" in found[0].sentence
+    assert "other sensors" not in found[0].sentence
 
 
 def test_a_body_that_stands_still_is_not_silent(perfect):

@@ -149,3 +149,11 @@ def test_a_grid_that_nothing_covers_is_refused_where_it_stops():
         assert refused.value.interval == 2
     with pytest.raises(ValueError, match="log_duration"):
         best_spans(first, step, seen, np.zeros((3, 1, 2)))
+
+
+def test_one_state_is_a_model():
+    seen = np.log(np.array([[0.5], [0.25]]))
+    state, log_p = viterbi(np.zeros(1), np.zeros((1, 1)), seen)
+    assert state.tolist() == [0, 0]
+    assert log_p == pytest.approx(np.log(0.125))
+    assert log_probability(np.zeros(1), np.zeros((1, 1)), seen) == pytest.approx(np.log(0.125))

@@ -61,3 +61,8 @@ def test_agreement_is_the_mean_of_both_and_rises_with_each():
     assert agreement(0.4, 0.2) == pytest.approx((0.4 + 0.6) / 2)
     assert agreement(0.5, 0.2) > agreement(0.4, 0.2)
     assert agreement(0.4, 0.3) > agreement(0.4, 0.2)
+
+
+def test_bins_above_every_value_are_there_and_empty():
+    np.testing.assert_array_equal(histogram(np.array([0.5]), np.array([1.0, 2.0, 3.0])), [1, 0, 0, 0])
+    np.testing.assert_array_equal(histogram(np.zeros(0), np.array([1.0, 2.0])), [0, 0, 0])

@@ -169,7 +169,7 @@ def test_steps_into_and_out_of_a_contact_are_no_slide():
     assert contacts.foot_slide(ankle, ankle, planted, frame_rate_hz=30) == 0.0
 
 
-EACH_FRAME = contacts.Thresholds(window_s=0.0)
+EACH_FRAME = contacts.ContactThresholds(window_s=0.0)
 
 
 def standing(is_low, frame_rate_hz):
@@ -280,7 +280,7 @@ def test_the_lower_foot_of_each_frame_counts():
 def test_heights_are_means_over_half_the_window():
     foot = np.zeros((61, 2, 3))
     foot[..., 1] = 0.04 * (np.arange(61) % 2)[:, None]  # a tremor up to beyond the tight limit
-    slow = contacts.Thresholds(
+    slow = contacts.ContactThresholds(
         tight_speed_m_per_s=9, loose_speed_m_per_s=9, tight_height_m=0.03, loose_height_m=0.03, widest_gap_s=0.0
     )
     found = contacts.find_contacts(foot, foot, frame_rate_hz=120, planted_height_m=(0.0, 0.0), thresholds=slow)
@@ -328,3 +328,13 @@ def test_runs():
     mask = np.array([True, True, False, True, False, False, True])
     np.testing.assert_array_equal(contacts.runs(mask), [[0, 3, 6], [2, 4, 7]])
     np.testing.assert_array_equal(contacts.runs(np.zeros(0, bool)), np.zeros((2, 0)))
+
+
+def test_a_few_frames_lower_than_the_floor_are_not_its_height():
+    foot = np.zeros((200, 2, 3))
+    foot[..., 1] = 0.1
+    foot[150:, :, 1] = 0.4
+    foot[60:70, :, 1] = -0.2
+    assert contacts.planted_heights(foot, foot, frame_rate_hz=30) == pytest.approx((0.1, 0.1))
+    foot[60:130, :, 1] = -0.2  # now it is a good part of the clip
+    assert contacts.planted_heights(foot, foot, frame_rate_hz=30) == pytest.approx((-0.2, -0.2))
