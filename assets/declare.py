@@ -7,7 +7,7 @@ from typing import Any
 
 import dagster as dg
 
-from assets.dancing.danced import Markdown
+from assets.dancing.chosen_steps import Markdown
 from assets.dancing.method import Method
 from assets.dancing.refusal import RefusalError
 from schemas.table import Table

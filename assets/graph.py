@@ -20,8 +20,8 @@ from assets.tables import pack
 from assets.tables.graph import from_motion_graph_edge, from_motion_graph_node
 from assets.tables.motion import CanonicalClip, to_canonical_pose
 from kernels import rotation
+from kernels.graph.beat_features import BeatFeatures, beat_features
 from kernels.graph.distance import PairDistance
-from kernels.graph.features import BeatFeatures, beat_features
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
 from kernels.graph.shortlist import nearest_of

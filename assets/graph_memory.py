@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.graph.beat_features import BeatFeatures, concatenate_beats
 from kernels.graph.distance import PairDistance, PoseFeatures
-from kernels.graph.features import BeatFeatures, concatenate_beats
 from kernels.graph.nodes import BeatNodes
 from kernels.graph.shortlist import Shortlist, Work, make_shortlist, update_shortlist
 from kernels.graph.transitions import Nearest

@@ -10,7 +10,7 @@ from assets.declare import table_asset, table_assets
 from assets.partitions import EVERY
 from assets.plots import hmm as hmm_plots
 from assets.reading.hearing import SYMBOLS, hear
-from assets.reading.motions import cut
+from assets.reading.motion_cuts import cut
 from assets.sources import performances
 from assets.sources.performances import Performance
 from assets.sources.sources import Studio

@@ -10,7 +10,7 @@ from assets.declare import code_version, table_asset
 from assets.partitions import SESSION
 from assets.plots import matching as matching_plots
 from assets.plots.motion import session_beats
-from assets.reading.motions import cut
+from assets.reading.motion_cuts import cut
 from assets.sources.sources import Studio
 from assets.stamps import Earlier, Part, Parts, Progress, Stored, clip_versions, per_clip, version_of
 from assets.tables import hmm as hmm_tables
@@ -19,8 +19,8 @@ from assets.tables import pack
 from assets.tables.motion import from_canonical_pose, from_motion_beat, to_canonical_pose, to_pose, to_skeleton
 from kernels import rotation
 from kernels.hmm.states import assign
-from kernels.motion.beats import BeatSettings, motion_beats
-from kernels.motion.features import contacts_at_feature_rate, motion_features
+from kernels.motion.motion_beats import BeatSettings, motion_beats
+from kernels.motion.motion_features import contacts_at_feature_rate, motion_features
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.contacts import foot_contacts

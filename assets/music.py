@@ -20,9 +20,9 @@ from assets.tables import pack
 from assets.tables.music import from_music_beat, from_music_loudness, from_music_tempo, to_music_beat
 from kernels.assembly.timing import cover
 from kernels.music.beats import BeatAnalysis, TempoCandidate, track_beats
-from kernels.music.features import music_features
-from kernels.music.intensity import loudness_db
 from kernels.music.level import change_level, nudge
+from kernels.music.loudness import loudness_db
+from kernels.music.music_features import music_features
 from kernels.music.preview import render_preview
 from kernels.music.repeats import find_repeats
 from kernels.music.segments import beat_features, cut_song, novelty

@@ -13,7 +13,7 @@ from assets.sources.sources import Studio, brief_version, song_version
 from assets.stamps import Part, Parts, Progress, Stored, repeatable, version_of
 from assets.tables import hmm as hmm_tables
 from assets.tables.pack import read_rows
-from kernels.music.percussion import Contour, band_hits, contour, drum_hits
+from kernels.music.drums_and_melody import Contour, band_hits, contour, drum_hits
 from kernels.music.preview import render_preview
 from schemas.music import MELODY, PERCUSSION
 

@@ -63,7 +63,7 @@ def motion_encoder(
     clip: Stored, canonical_pose: Stored, studio: dg.ResourceParam[Studio], progress: dg.ResourceParam[Progress]
 ) -> Part:
     """Train the encoder on the catalogue; once made it is kept, so that what was embedded stays comparable."""
-    from kernels.search.fit import fit  # JAX: loaded where something is trained, and nowhere else
+    from kernels.search.encoder_fit import fit  # JAX: loaded where something is trained, and nowhere else
     from kernels.search.train import Training
 
     settings = studio.settings().search

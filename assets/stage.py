@@ -37,8 +37,8 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
 class Stage:
     """A dance ready to be written: its motion, its song, what it was made from, how good it is.
 
-    ``lineage`` has a value a frame by the names of :data:`schemas.usd.LINEAGE`; ``cast`` is the character it is danced
-    by, None for odori's own body; ``asked`` the version of that wish.
+    ``lineage`` has a value a frame by the names of :data:`schemas.stage_contract.LINEAGE`; ``cast`` is the character it
+    is danced by, None for odori's own body; ``asked`` the version of that wish.
     """
 
     song_id: str
@@ -175,7 +175,7 @@ def _quality(table: pa.Table) -> dict[str, Any]:
 
 
 def lineage_of(frames: pa.Table, choreography: pa.Table) -> dict[str, Any]:
-    """Gather what the stage says of each frame, by the names of :data:`schemas.usd.LINEAGE`.
+    """Gather what the stage says of each frame, by the names of :data:`schemas.stage_contract.LINEAGE`.
 
     Parameters
     ----------

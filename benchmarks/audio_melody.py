@@ -3,9 +3,9 @@
     python benchmarks/audio_melody.py [--songs N] [--json]
 
 General MIDI songs of real test data are played by our own preview, the highest notes that start together are the melody
-(:func:`kernels.music.percussion.contour`), and the same five ways to go are sought in the sound: by pYIN (Mauch and
-Dixon, 2014), and by the strongest harmonic sum of a constant-Q transform, between C4 and C7; a note is a pitch held for
-70 ms. *Found* is the share of the melody's steps with a heard one within 70 ms that goes the same way, *chance* the
+(:func:`kernels.music.drums_and_melody.contour`), and the same five ways to go are sought in the sound: by pYIN (Mauch
+and Dixon, 2014), and by the strongest harmonic sum of a constant-Q transform, between C4 and C7; a note is a pitch held
+for 70 ms. *Found* is the share of the melody's steps with a heard one within 70 ms that goes the same way, *chance* the
 same with the heard ways shuffled, *right* the share of heard steps that are the melody's.
 """
 
@@ -24,7 +24,7 @@ REPOSITORY = Path(__file__).parents[1]
 sys.path.insert(0, str(REPOSITORY))
 
 from assets.formats import midi  # noqa: E402
-from kernels.music.percussion import LARGEST_STEP, Contour, contour  # noqa: E402
+from kernels.music.drums_and_melody import LARGEST_STEP, Contour, contour  # noqa: E402
 from kernels.music.preview import render_preview  # noqa: E402
 from kernels.types import Float  # noqa: E402
 

@@ -42,7 +42,7 @@ from kernels.calibration.springs import relax_frame, spring_body
 from kernels.calibration.tree_solver import Stream
 from kernels.opencl.choice import pick_device
 from kernels.opencl.tree_gauss_newton import TreeGaussNewton
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 DOCUMENT_S = 518.8
 N_PYTHON_FRAMES = 30
@@ -63,7 +63,7 @@ def median(repeats: int, run: Callable[[], object]) -> tuple[float, float, float
 
 def speed(n_frames: int, repeats: int, device: str | None) -> dict[str, float | str]:
     """Figures of speed."""
-    made = suit.made_up(1000, n_frames=n_frames)
+    made = suit_performer.made_up(1000, n_frames=n_frames)
     begin = time.perf_counter()
     solver = TreeGaussNewton(cl.Context([pick_device(device)]), parent=PARENT)
     build_s = time.perf_counter() - begin
@@ -130,7 +130,7 @@ def speed(n_frames: int, repeats: int, device: str | None) -> dict[str, float | 
 def main() -> None:
     """Parse the command line, measure, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=suit.N_DOCUMENT_FRAMES)
+    parser.add_argument("--frames", type=int, default=suit_performer.N_DOCUMENT_FRAMES)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--device", default=None, help="index or part of a name; default: first GPU, else CPU")
     parser.add_argument("--bars", action="store_true", help="the table of accuracies too: minutes")

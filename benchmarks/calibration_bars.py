@@ -23,7 +23,7 @@ from kernels.calibration.tree_solver import solve_tree
 from kernels.opencl.choice import pick_device
 from kernels.opencl.spring_relaxation import SpringRelaxation
 from kernels.opencl.tree_gauss_newton import TreeGaussNewton
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 from kernels.synthetic.suit_faults import FAULTS
 from kernels.types import Float
 
@@ -43,7 +43,7 @@ def lengths(in_parent_m: Float, in_child_m: Float) -> Float:
     return np.array(found)
 
 
-def anchor_errors_mm(found: Calibration, body: suit.SyntheticBody) -> Float:
+def anchor_errors_mm(found: Calibration, body: suit_performer.SyntheticBody) -> Float:
     """Error of each joint, (16,), the larger of its two sensors' views."""
     return _MM * np.maximum(
         np.linalg.norm(found.in_parent_sensor_m - body.in_parent_sensor_m, axis=1),
@@ -51,7 +51,7 @@ def anchor_errors_mm(found: Calibration, body: suit.SyntheticBody) -> Float:
     )
 
 
-def length_errors_mm(found: Calibration, body: suit.SyntheticBody) -> Float:
+def length_errors_mm(found: Calibration, body: suit_performer.SyntheticBody) -> Float:
     """Error of each length, (19,)."""
     truth = lengths(body.in_parent_sensor_m, body.in_child_sensor_m)
     return _MM * np.abs(lengths(found.in_parent_sensor_m, found.in_child_sensor_m) - truth)
@@ -72,8 +72,8 @@ def bars(n_frames: int, n_seeds: int, device: str | None) -> Figures:
     }
 
 
-def _made(seed: int, n_frames: int, **how: float) -> tuple[suit.MadeUp, Cleaned, Calibration]:
-    made = suit.made_up(seed, n_frames=n_frames, disturbance=suit.Disturbance(**how))
+def _made(seed: int, n_frames: int, **how: float) -> tuple[suit_performer.MadeUp, Cleaned, Calibration]:
+    made = suit_performer.made_up(seed, n_frames=n_frames, disturbance=suit_performer.Disturbance(**how))
     cleaned = clean(made.recording)
     return made, cleaned, calibrate(cleaned)
 
@@ -115,7 +115,7 @@ def _hinges(n_frames: int, seeds: range) -> Figures:
     wrong, across, far, length = 0, [0.0], [0.0], []
     knees = ("l_shank", "r_shank")
     for seed in seeds:
-        made = suit.made_up(seed, n_frames=n_frames, hinged=knees)
+        made = suit_performer.made_up(seed, n_frames=n_frames, hinged=knees)
         found = calibrate(clean(made.recording))
         wrong += sum((joint.rank != 3) != (joint.joint in knees) for joint in found.joints)
         for name in knees:
@@ -145,7 +145,7 @@ def _lengths_without(joints: tuple[str, ...]) -> list[int]:
 def _frozen(n_frames: int, seeds: range) -> Figures:
     named, length = 0, []
     for seed in seeds:
-        made = suit.made_up(seed, n_frames=n_frames, frozen=("head",))
+        made = suit_performer.made_up(seed, n_frames=n_frames, frozen=("head",))
         found = calibrate(clean(made.recording))
         errors = [one for one in found.findings if one.severity == "error"]
         named += [one.sensor for one in errors] == ["head"] and found.joints[JOINTS.index("head")].rank < 2
@@ -169,7 +169,7 @@ def _topology(n_frames: int, seeds: range) -> Figures:
     ):
         wrong = 0
         for seed in seeds:
-            made = suit.made_up(seed, n_frames=n_frames, disturbance=suit.Disturbance(**how))
+            made = suit_performer.made_up(seed, n_frames=n_frames, disturbance=suit_performer.Disturbance(**how))
             cleaned = clean(made.recording)
             whole = ~cleaned.is_filled.any(axis=1)
             turned = rotation.to_matrix(np.moveaxis(cleaned.recording.rotation_wxyz[whole], 1, 0))
@@ -274,14 +274,16 @@ def _faults(n_frames: int, seeds: range) -> Figures:
 
     missed: list[str] = []
     for seed in seeds:
-        recording = suit.made_up(seed, n_frames=n_frames).recording
+        recording = suit_performer.made_up(seed, n_frames=n_frames).recording
         for name, fault in FAULTS.items():
             if not is_named(judge(fault.spoil(recording)), fault.severity, fault.sensor, fault.words):
                 missed.append(f"{name} (seed {seed})")
     false_alarms = 0
     for seed in seeds:
         for wobble_m in (0.0, 0.005, 0.012):
-            made = suit.made_up(seed, n_frames=n_frames, disturbance=suit.Disturbance(wobble_m=wobble_m))
+            made = suit_performer.made_up(
+                seed, n_frames=n_frames, disturbance=suit_performer.Disturbance(wobble_m=wobble_m)
+            )
             false_alarms += len(judge(made.recording))
     return {
         "row18_fault_count": len(FAULTS) * len(seeds),

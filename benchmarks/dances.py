@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from studio_dances import BuiltStudio, Danced, built, percentile
 
-from assets.formats.settings import read_settings
+from assets.formats.settings_file import read_settings
 from kernels.assembly import foot_quality, quality, seam_quality
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet

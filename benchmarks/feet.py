@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from studio_dances import BuiltStudio, Danced, built, percentile
 
-from assets.formats.settings import read_settings
+from assets.formats.settings_file import read_settings
 from kernels.assembly.blend import assemble
 from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.foot_quality import foot_measures, knee_measures, seam_slips

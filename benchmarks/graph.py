@@ -30,9 +30,9 @@ import pyopencl as cl
 
 from kernels import rotation
 from kernels.graph import prune
+from kernels.graph.beat_features import BeatFeatures, beat_features, concatenate_beats, default_weight
 from kernels.graph.costs import PathCosts
 from kernels.graph.distance import Metric, pose_distance
-from kernels.graph.features import BeatFeatures, beat_features, concatenate_beats, default_weight
 from kernels.graph.nodes import BeatNodes, beat_nodes
 from kernels.graph.path import find_path
 from kernels.graph.transitions import N_NEAREST, connect, nearest

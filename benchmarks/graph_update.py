@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import pyopencl as cl
 from graph import made_up_clip, median
 
-from kernels.graph.features import BeatFeatures, beat_features, concatenate_beats
+from kernels.graph.beat_features import BeatFeatures, beat_features, concatenate_beats
 from kernels.graph.nodes import BeatNodes, beat_nodes
 from kernels.graph.shortlist import Shortlist, Work, make_shortlist, nearest_of, update_shortlist
 from kernels.graph.transitions import Transitions, connect

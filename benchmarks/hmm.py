@@ -29,11 +29,11 @@ sys.path.insert(0, str(REPOSITORY))
 
 from assets.formats import bvh, midi  # noqa: E402
 from kernels.hmm import model as hmm  # noqa: E402
-from kernels.hmm.character import identify  # noqa: E402
 from kernels.hmm.evidence import measure  # noqa: E402
+from kernels.hmm.identity import identify  # noqa: E402
 from kernels.hmm.viterbi import viterbi  # noqa: E402
-from kernels.synthetic import performance as made_up  # noqa: E402
-from pipelines.commands.dance import dance_songs  # noqa: E402
+from kernels.synthetic import hidden_rules as made_up  # noqa: E402
+from pipelines.commands.dance_songs import dance_songs  # noqa: E402
 from pipelines.resources import NoProgress  # noqa: E402
 from pipelines.studio.folder import StudioFolder  # noqa: E402
 from pipelines.studio.lake import Lake  # noqa: E402

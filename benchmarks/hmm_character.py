@@ -28,10 +28,10 @@ sys.path.insert(0, str(REPOSITORY))
 from assets.formats import bvh, midi  # noqa: E402
 from assets.tables import pack  # noqa: E402
 from assets.tables.motion import to_canonical_poses  # noqa: E402
-from kernels.hmm.character import chance_of, nearest_dancer, pose_windows  # noqa: E402
-from kernels.synthetic import performance as made_up  # noqa: E402
+from kernels.hmm.identity import chance_of, nearest_dancer, pose_windows  # noqa: E402
+from kernels.synthetic import hidden_rules as made_up  # noqa: E402
 from kernels.types import Float  # noqa: E402
-from pipelines.commands.dance import dance_songs  # noqa: E402
+from pipelines.commands.dance_songs import dance_songs  # noqa: E402
 from pipelines.resources import NoProgress  # noqa: E402
 from pipelines.studio.folder import StudioFolder  # noqa: E402
 

@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from studio_dances import REPOSITORY, BuiltStudio, Danced, built, percentile
 
-from assets.formats.settings import read_settings
+from assets.formats.settings_file import read_settings
 from kernels.assembly.blend import assemble
 from kernels.assembly.joins import SHAPES
 from kernels.assembly.seam_quality import peak_ratios, phrases_alone

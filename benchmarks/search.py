@@ -28,7 +28,7 @@ from search_baselines import mean_and_deviation, warped
 
 from assets.formats import bvh
 from kernels import rotation
-from kernels.search import fit, network, train
+from kernels.search import encoder_fit, network, train
 from kernels.search.aligned import MOST_FRAMES, N_TRACK, QUERY_HZ, Alignment, align, room, track
 from kernels.search.augment import Augmentation
 from kernels.search.discriminant import principal, unit
@@ -91,7 +91,7 @@ class Methods:
         names = sorted({clip.label for clip in clips})
         self.number = np.array([names.index(clip.label) for clip in clips])
         self.label = [clip.label for clip in clips]
-        self.statistics = fit.statistics_of(self.window, has_travel=True)
+        self.statistics = encoder_fit.statistics_of(self.window, has_travel=True)
         self.channels = [channels(window) for window in self.window]
 
     def run(self, held: NDArray[np.bool_]) -> Iterator[tuple[str, Distances]]:
@@ -120,16 +120,16 @@ class Methods:
         spread = principal(told, 128)
         yield (
             "untrained and self-supervised (no labels)",
-            apart(self._joined(Encoder(fit.UNLABELLED, True, spread, None, alone))),
+            apart(self._joined(Encoder(encoder_fit.UNLABELLED, True, spread, None, alone))),
         )
-        turned = fit.mirrored_labels(motions, number, told, has_travel=True)
+        turned = encoder_fit.mirrored_labels(motions, number, told, has_travel=True)
         weights = train.train(motions, number, how=how, mirrored_label=turned)
         yield "network, supervised contrast", apart(self._network(weights))
-        telling = fit.mirrored_discriminant(motions, number, told, turned, has_travel=True)
+        telling = encoder_fit.mirrored_discriminant(motions, number, told, turned, has_travel=True)
         yield "statistics, discriminant", apart(unit(telling(self.statistics)))
         yield (
             "**both together (the default)**",
-            apart(self._joined(Encoder(fit.LABELLED, True, spread, telling, weights))),
+            apart(self._joined(Encoder(encoder_fit.LABELLED, True, spread, telling, weights))),
         )
 
     def _network(self, weights: train.Trained) -> NDArray[np.float32]:
@@ -164,7 +164,7 @@ def accuracy(clips: list[Labelled], most: int) -> dict[str, dict[str, Retrieval]
 def default(clips: list[Labelled]) -> tuple[Encoder, float]:
     """Fit the default encoder to all clips; and the CPU seconds that took."""
     begun = time.process_time()
-    fitted = fit.fit([clip.window for clip in clips], [clip.label for clip in clips], how=train.Training())
+    fitted = encoder_fit.fit([clip.window for clip in clips], [clip.label for clip in clips], how=train.Training())
     return fitted.encoder, time.process_time() - begun
 
 

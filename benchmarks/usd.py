@@ -26,7 +26,7 @@ from assets.formats import usd, usd_check, usd_package, usd_read
 from kernels import rotation
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.types import Clip
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 def made_up_clip(n_frames: int) -> Clip:

@@ -10,7 +10,7 @@ from kernels.calibration.cleaning import clean
 from kernels.calibration.poses import body_model, gaps
 from kernels.calibration.springs import relax_springs
 from kernels.calibration.tree_solver import Stream, solve_tree
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 HERE = Path(__file__).parent
 WIDE, HIGH = 640, 300
@@ -20,7 +20,7 @@ MOST_STEPS, LEAST_MM, MOST_MM = 100, 0.01, 10.0
 
 def measured() -> tuple[dict[int, float], float]:
     """Root mean square gap in mm, by iterations of the springs, and after one step on the tree."""
-    made = suit.made_up(7, n_frames=3000)
+    made = suit_performer.made_up(7, n_frames=3000)
     cleaned = clean(made.recording)
     model = body_model(calibrate(cleaned))
     whole = np.flatnonzero(~cleaned.is_filled.any(axis=1))[::10]

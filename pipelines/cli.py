@@ -85,7 +85,7 @@ def build(
 
     Only what changed is computed again.
     """
-    from pipelines.commands.build import build_studio
+    from pipelines.commands.build_studio import build_studio
 
     with _Trouble(as_json):
         result = build_studio(_folder(studio), dances=dances, progress=_progress())
@@ -209,7 +209,7 @@ def _dance(
     as_json: bool,
     **more: Any,  # noqa: ANN401 - what else dance_songs takes
 ) -> None:
-    from pipelines.commands.dance import dance_songs
+    from pipelines.commands.dance_songs import dance_songs
 
     with _Trouble(as_json):
         result = dance_songs(
@@ -296,9 +296,9 @@ def search(
 ) -> None:
     """Find the clips most like a motion."""
     with _Trouble(as_json):
-        from pipelines.commands import search as searching
+        from pipelines.commands import search_motions
 
-        wish = searching.MotionQuery(
+        wish = search_motions.MotionQuery(
             query=clip or "",
             k=k,
             label=label or (),
@@ -310,7 +310,7 @@ def search(
             unlike=unlike or (),
         )
         # The bar is made where something has to be: loading it loads Dagster.
-        result = searching.search(_folder(studio), wish, sheet=sheet, train=train, progress=lambda: _progress()())
+        result = search_motions.search(_folder(studio), wish, sheet=sheet, train=train, progress=lambda: _progress()())
         _finish(result, as_json)
 
 
@@ -345,9 +345,9 @@ def calibrate(
     The report says how sure each bone length is, and what to record again. No studio is needed.
     """
     with _Trouble(as_json):
-        from pipelines.commands import calibrate as calibrating
+        from pipelines.commands import calibrate_recording
 
-        result = calibrating.calibrate(
+        result = calibrate_recording.calibrate(
             recording,
             studio=studio or (_folder(None) if "ODORI_STUDIO" in os.environ else None),
             bvh_out=bvh,
@@ -370,10 +370,10 @@ def status(
     as_json: JsonOption = False,
 ) -> None:
     """Say what is fresh, stale, failed or refused, and why."""
-    from pipelines.commands.status import status as say_status
+    from pipelines.commands.status import studio_status
 
     with _Trouble(as_json):
-        _finish(say_status(_folder(studio), devices=devices), as_json)
+        _finish(studio_status(_folder(studio), devices=devices), as_json)
 
 
 @app.command(epilog=_examples("odori ui", "odori ui --port 3001"))

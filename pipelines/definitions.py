@@ -8,7 +8,7 @@ from pipelines import jobs, schedules, sensors
 from pipelines.build import mark_asked
 from pipelines.caches import settle
 from pipelines.collection import ASSETS, freshness
-from pipelines.devices import Devices
+from pipelines.device_fallback import Devices
 from pipelines.io_managers import EarlierTables, IndexIOManager, LakeIOManager, StageIOManager
 from pipelines.resources import GraphMemory, NoProgress
 from pipelines.solvers import PoseSolvers

@@ -5,7 +5,7 @@ from typing import Any, Literal
 from kernels.calibration.records import PARENT
 from kernels.calibration.springs import relax_springs
 from kernels.calibration.tree_solver import BodyModel, PoseSolver, Solved, Stream, solve_tree
-from pipelines.devices import Devices, OnDevice
+from pipelines.device_fallback import Devices, OnDevice
 
 
 class PoseSolvers:

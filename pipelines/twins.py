@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from assets.matching import SegmentMatcher
 from kernels.graph.distance import PairDistance, PoseFeatures, pose_distance
 from kernels.matching.score import Match
-from pipelines.devices import Devices, OnDevice
+from pipelines.device_fallback import Devices, OnDevice
 from schemas.settings import MatchingSettings
 
 

@@ -52,16 +52,39 @@ def test_no_public_class_name_means_two_things():
     assert {name: paths for name, paths in homes.items() if len(paths) > 1} == {}
 
 
+AREA_FOLDERS = {"schemas", "assets", "assets/tables", "assets/plots", "assets/reading", "assets/sources"}
+
+
+def test_no_module_name_means_two_things():
+    """A module's name stands once in the house; only an area's comes again, where that is made, packed or drawn.
+
+    An area is a file of `schemas` or of `assets` itself: `music` is its tables, its assets, its rows and its pictures.
+    A plural is the same name, unless both stand in one folder: `method` is the record, `methods` are those there are.
+    """
+    homes = {}
+    for path in SOURCES:
+        if path.name != "__init__.py":
+            homes.setdefault(path.stem.removesuffix("s"), set()).add(path.relative_to(REPOSITORY))
+    doubled = {}
+    for name, paths in homes.items():
+        folders, stems = {p.parent.as_posix() for p in paths}, {p.stem for p in paths}
+        is_area = len(stems) == 1 and folders <= AREA_FOLDERS and folders & {"schemas", "assets"}
+        is_record_and_list = len(folders) == 1
+        if len(paths) > 1 and not is_area and not is_record_and_list:
+            doubled[name] = sorted(map(str, paths))
+    assert doubled == {}
+
+
 # Declarations, plain records and the thinnest glue are tested where they are used.
 TESTED_ELSEWHERE = {
     "assets/dancing/method.py",  # records
     "assets/dancing/match_pieces.py",  # in test_by_matching.py
-    "pipelines/commands/build.py",  # in test_commands.py and test_build.py
+    "pipelines/commands/build_studio.py",  # in test_commands.py and test_build.py
     "pipelines/commands/check.py",
-    "pipelines/commands/dance.py",
+    "pipelines/commands/dance_songs.py",
     "pipelines/commands/session.py",
     "pipelines/studio/folder.py",
-    "assets/dancing/danced.py",  # a record
+    "assets/dancing/chosen_steps.py",  # a record
     "schemas/options.py",  # in test_settings.py
     "assets/capture.py",
     "assets/choreography.py",
@@ -98,7 +121,7 @@ TESTED_ELSEWHERE = {
     "schemas/motion.py",
     "schemas/music.py",
     "schemas/search.py",
-    "schemas/usd.py",
+    "schemas/stage_contract.py",
 }
 
 
@@ -140,13 +163,13 @@ def test_no_index_host_and_no_path_of_a_machine():
 UNDOCUMENTED = {
     f"{folder}/{name}.py"
     for folder, names in {
-        "kernels/graph": "alternatives distance features nodes path pins program",
-        "kernels/hmm": "character durations evidence instances model states viterbi",
-        "kernels/search": "augment discriminant document encoder fit measure network train",
+        "kernels/graph": "alternatives distance beat_features nodes path pin_conflicts program",
+        "kernels/hmm": "identity durations evidence instances model states viterbi",
+        "kernels/search": "augment discriminant document encoder encoder_fit measure network train",
         "kernels/motion": "key_poses",
         "kernels/skeleton": "contacts",
-        "kernels/music": "percussion",
-        "kernels/synthetic": "performance",
+        "kernels/music": "drums_and_melody",
+        "kernels/synthetic": "hidden_rules",
         "schemas": "pins",
         "assets/formats": "usd_character",
         "assets": "dance graph_memory stage",
@@ -155,7 +178,8 @@ UNDOCUMENTED = {
         "assets/tables": "choreography graph hmm motion music pack search",
         "pipelines": "build cli collection freshness io_managers jobs resources schedules sensors web",
         "pipelines/studio": "files folder lake",
-        "pipelines/commands": "asked build calibrate check dance dance_report hmm_report progress propose session "
+        "pipelines/commands": "arguments build_studio calibrate_recording check dance_songs dance_report "
+        "hmm_report progress propose session "
         "status why",
     }.items()
     for name in names.split()
@@ -247,7 +271,10 @@ def test_text_files_are_utf8_on_every_system(path):
 POSIX_ALONE = {"fcntl", "grp", "posix", "pwd", "resource", "termios", "tty"}
 POSIX_CALLS = {"os.kill", "os.killpg", "os.getuid", "os.fork", "os.uname", "os.name", "sys.platform", "signal.SIGKILL"}
 ONE_PLACE = {"assets/formats/file_names.py", "pipelines/caches.py"}  # names of files; the user's cache folder
-WITHOUT_TOO = {"kernels/opencl/pocl_target.py", "pipelines/devices.py"}  # what Linux tells of the processor, or nothing
+WITHOUT_TOO = {
+    "kernels/opencl/pocl_target.py",
+    "pipelines/device_fallback.py",
+}  # what Linux tells of the processor, or nothing
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(REPOSITORY)))

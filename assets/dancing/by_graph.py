@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assets.dancing import licences, wishes
 from assets.dancing.asked import SOFT_WISH, Direction
-from assets.dancing.danced import ChosenSteps, Markdown
+from assets.dancing.chosen_steps import ChosenSteps, Markdown
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.pose_pins import ClipPoses, to_pose_pins
 from assets.dancing.refusal import RefusalError
@@ -24,7 +24,7 @@ from kernels.assembly.timing import blend_widths, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts, intensity_price
 from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, to_choreography
-from kernels.graph.pins import Conflict, Pin, Reach, admitted, find_conflict, step_price
+from kernels.graph.pin_conflicts import Conflict, Pin, Reach, admitted, find_conflict, step_price
 from kernels.graph.program import StepPrice
 from kernels.graph.structure import structure_pins
 from kernels.graph.transitions import THRESHOLD

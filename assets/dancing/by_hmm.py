@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from assets.dancing import hmm_wishes, licences
 from assets.dancing.asked import Direction
-from assets.dancing.danced import ChosenSteps, Markdown
+from assets.dancing.chosen_steps import ChosenSteps, Markdown
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.recordings import choose_recordings, ends_of
 from assets.dancing.refusal import RefusalError
@@ -30,11 +30,11 @@ from kernels.hmm.evidence import Evidence
 from kernels.hmm.instances import Motions
 from kernels.hmm.links import link
 from kernels.hmm.model import Model
-from kernels.hmm.pins import SpanReach
 from kernels.hmm.places import MotionWish, Places, crowded_cost, keep_wishes, place
 from kernels.hmm.seams import Ends
+from kernels.hmm.span_reach import SpanReach
 from kernels.hmm.viterbi import Spans, best_spans, sample_spans
-from kernels.matching.path import to_choreography
+from kernels.matching.match_sequence import to_choreography
 from kernels.types import Float
 from schemas.settings import Settings
 

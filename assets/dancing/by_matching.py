@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from assets.dancing import licences
-from assets.dancing.danced import ChosenSteps, Markdown
+from assets.dancing.chosen_steps import ChosenSteps, Markdown
 from assets.dancing.match_pieces import LoadedMatches, load_matches, pieces_of
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.refusal import RefusalError
@@ -15,8 +15,8 @@ from assets.plots.dance import phrase_table
 from assets.reading.clips import named_clips, read_clips
 from assets.stamps import Stored, repeatable
 from kernels.assembly.timing import blend_widths, cover
-from kernels.matching import path
-from kernels.matching.joints import clip_directions, joints_of
+from kernels.matching import match_sequence
+from kernels.matching.piece_joints import clip_directions, joints_of
 from kernels.types import Choreography, Float
 from schemas.settings import Settings
 
@@ -46,7 +46,7 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
     clip_ids = sorted({p.clip_id for ps in pieces for p in ps})
     index = {clip: i for i, clip in enumerate(clip_ids)}
     candidates = [
-        path.Candidates(
+        match_sequence.Candidates(
             np.array([index[p.clip_id] for p in ps], np.int64),
             np.array([p.start_s for p in ps]),
             np.array([p.end_s for p in ps]),
@@ -61,13 +61,13 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         blend_s=settings.dance.blend_s,
         seam_weight=settings.match_path.seam_weight,
     )
-    chosen = path.choose(
+    chosen = match_sequence.choose(
         candidates,
         joints,
         repetition_weight=settings.match_path.repetition_weight,
         unconnected_cost=settings.match_path.unconnected_cost or None,
     )
-    steps, span_of = path.to_choreography(
+    steps, span_of = match_sequence.to_choreography(
         candidates,
         chosen,
         start_s=spans[:-1],
@@ -127,7 +127,7 @@ def directions_of(canonical_pose: Stored, wanted: set[str]) -> Iterator[tuple[st
 
     Yields
     ------
-    clip_id, and what :func:`kernels.matching.joints.clip_directions` has of it
+    clip_id, and what :func:`kernels.matching.piece_joints.clip_directions` has of it
     """
     for moved in named_clips(canonical_pose, wanted):
         yield moved.clip_id, *clip_directions(moved.position_xyz_m, moved.rotation_wxyz[:, 0], moved.frame_rate_hz)

@@ -10,10 +10,10 @@ from assets.sources.sources import FilePath, Sources, Studio, brief_of, fingerpr
 from assets.stamps import Stored
 from assets.tables.motion import to_pose, to_skeleton
 from kernels.skeleton import grounding, kinematics
+from kernels.skeleton.body_fit import fit
+from kernels.skeleton.body_measure import leg_length_m, measure
 from kernels.skeleton.canonical import LEG_LENGTH_M
-from kernels.skeleton.character import leg_length_m, measure
 from kernels.skeleton.contacts import find_contacts, foot_slide
-from kernels.skeleton.fit import fit
 from kernels.types import Clip, Float, Skeleton
 
 

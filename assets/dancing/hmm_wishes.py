@@ -8,8 +8,8 @@ from assets.dancing.by_graph import conflicting, no_place
 from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import DirectionError, Nodes, PartNames
 from assets.reading.songs import PlayedSong
-from kernels.graph.pins import Pin, find_conflict
-from kernels.hmm.pins import SpanReach
+from kernels.graph.pin_conflicts import Pin, find_conflict
+from kernels.hmm.span_reach import SpanReach
 
 MOTION_PARTS = PartNames("motions of known kinds", "row of motions")
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from assets.dancing.asked import Direction
-from assets.dancing.danced import ChosenSteps
+from assets.dancing.chosen_steps import ChosenSteps
 from assets.stamps import Stored
 from kernels.types import BeatGrid
 from schemas.settings import Settings

@@ -13,11 +13,11 @@ from assets.reading.clips import named_clips
 from assets.reading.songs import PlayedSong
 from assets.stamps import Stored
 from assets.tables.motion import CanonicalClip
+from kernels.graph.beat_features import VELOCITY_TIME_S, BeatFeatures, beat_features
 from kernels.graph.distance import pose_distance
-from kernels.graph.features import VELOCITY_TIME_S, BeatFeatures, beat_features
 from kernels.graph.path import STEPS
-from kernels.graph.pins import Pin
-from kernels.graph.poses import furthest_ratio, pose_price, pose_ratio, pose_steps
+from kernels.graph.pin_conflicts import Pin
+from kernels.graph.pose_nodes import furthest_ratio, pose_price, pose_ratio, pose_steps
 from kernels.graph.program import StepPrice, step_ends
 from kernels.graph.transitions import THRESHOLD
 from kernels.types import Float, MotionGraph
@@ -36,7 +36,8 @@ class ClipPoses:
     ----------
     stored : the table ``canonical_pose``
     threshold : float, > 0
-        Poses are alike below this ratio, as :func:`kernels.graph.poses.pose_ratio` has it, by the metric "position".
+        Poses are alike below this ratio, as :func:`kernels.graph.pose_nodes.pose_ratio` has it, by the metric
+        "position".
     """
 
     stored: Stored

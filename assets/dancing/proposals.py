@@ -11,10 +11,10 @@ from assets.dancing.asked import Direction
 from assets.dancing.by_graph import GraphCatalogue, path_costs, pins_of, reach_of, search, strength_price, terms_of
 from assets.dancing.wishes import stretch
 from assets.reading.songs import PlayedSong
+from kernels.graph.moment_candidates import Proposals
 from kernels.graph.path import STEPS, first_beats, more_than_any
-from kernels.graph.pins import admitted
+from kernels.graph.pin_conflicts import admitted
 from kernels.graph.program import PathProgram
-from kernels.graph.proposals import Proposals
 from kernels.graph.structure import structure_pins
 from kernels.types import Float, Int
 from schemas.keys import is_mirrored

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from assets.reading.clips import named_clips
 from assets.stamps import Stored
 from assets.tables.motion import CanonicalClip
-from kernels.graph.features import beat_features
+from kernels.graph.beat_features import beat_features
 from kernels.hmm import instances
 from kernels.hmm.decode import Chain
 from kernels.hmm.instances import Motions
 from kernels.hmm.places import Places, missed_beats
 from kernels.hmm.seams import REACH_S, Ends, concatenate_ends, limb_paths, own_cost, seam_cost
 from kernels.hmm.viterbi import Spans
-from kernels.matching.path import Candidates, Chosen, continues
+from kernels.matching.match_sequence import Candidates, Chosen, continues
 from kernels.motion.velocity import accents, jerk_around, usable_frames
 from kernels.types import Float, Int
 from kernels.warp import warp_cost

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assets.reading.songs import PlayedSong
-from kernels.graph.pins import Conflict, Pin, WayOut
+from kernels.graph.pin_conflicts import Conflict, Pin, WayOut
 from schemas.pins import PinWish
 
 

@@ -55,7 +55,7 @@ class BodyMesh:
     normal_xyz : (V, 3) float64, unit
     triangle : (T, 3) int64, vertex indices, counter-clockwise seen from outside
     joint_index : (V,) int64, index into the skeleton's joints
-    side_index : (T,) int64, index into :data:`schemas.usd.SIDES`
+    side_index : (T,) int64, index into :data:`schemas.stage_contract.SIDES`
     """
 
     point_xyz_m: Float

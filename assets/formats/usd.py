@@ -2,9 +2,9 @@
 
 Conventions
 -----------
-Prim paths, axis and units are those of :mod:`schemas.usd`. Quaternions are ``wxyz`` everywhere in odori and imaginary
-part first in USD's arrays: this module alone turns them round. Time code = frame index, from 0. Same arguments, same
-bytes; files are written beside their place and renamed into it.
+Prim paths, axis and units are those of :mod:`schemas.stage_contract`. Quaternions are ``wxyz`` everywhere in odori and
+imaginary part first in USD's arrays: this module alone turns them round. Time code = frame index, from 0. Same
+arguments, same bytes; files are written beside their place and renamed into it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from assets.formats import beside, usd_lineage, usd_read
 from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.types import Clip, Float, Skeleton
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 if TYPE_CHECKING:
     from assets.formats.mesh import BodyMesh
@@ -59,7 +59,7 @@ def write_stage(
         Goes to the default prim's customData. Mappings, texts, numbers, truths and lists of one kind are kept as such,
         anything else as its JSON text. No dates, please: the same dance gives the same bytes.
     title : name in assetInfo
-    lineage : F values by the names of :data:`schemas.usd.LINEAGE`, or None
+    lineage : F values by the names of :data:`schemas.stage_contract.LINEAGE`, or None
         Where each frame comes from.
 
     Raises

@@ -11,7 +11,7 @@ from pxr import Sdf, Usd
 from assets.formats import usd, usd_character, usd_lineage
 from assets.formats.usd_character import Copy, UsdRig
 from kernels.types import Clip
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 def write_cast_stage(

@@ -22,11 +22,11 @@ from assets.formats import usd_read
 from assets.formats.errors import FormatError
 from kernels import rotation
 from kernels.skeleton import kinematics
-from kernels.skeleton.character import Character, measure
-from kernels.skeleton.fit import put_on
+from kernels.skeleton.body_fit import put_on
+from kernels.skeleton.body_measure import Character, measure
 from kernels.skeleton.naming import JointMapping, NoBodyError, map_joints
 from kernels.types import Clip, Float, Int, Skeleton
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 _FILE = re.compile(r"(?P<file>.+?\.usd[acz]?)(?::(?P<prim>/.*))?", re.IGNORECASE)

@@ -14,7 +14,7 @@ from pxr import Ar, Usd, UsdGeom, UsdMedia, UsdSkel
 from assets.formats import usd_lineage, usd_read
 from kernels.skeleton.canonical import JOINTS, REQUIRED_JOINTS
 from kernels.types import Float
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 _UNIT_ATOL = 1e-3
 _PLACE_ATOL_M = 1e-4

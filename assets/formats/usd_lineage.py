@@ -2,9 +2,9 @@
 
 Conventions
 -----------
-Names, types and meanings are those of :data:`schemas.usd.LINEAGE`. They sit on the SkelAnimation, so that lineage goes
-where the animation goes when it is referenced; readers that do not know them leave them alone. Samples are written only
-where a value changes, and on both sides of the change for numbers, which USD blends.
+Names, types and meanings are those of :data:`schemas.stage_contract.LINEAGE`. They sit on the SkelAnimation, so that
+lineage goes where the animation goes when it is referenced; readers that do not know them leave them alone. Samples are
+written only where a value changes, and on both sides of the change for numbers, which USD blends.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd
 
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 HELD = {"token": str, "string": str, "bool": bool}
 Frames = Mapping[str, Sequence[str] | Sequence[bool] | NDArray[np.float64]]
@@ -29,7 +29,7 @@ def write_lineage(layer: Sdf.Layer, animation: str, frames: Frames) -> None:
     ----------
     layer : Sdf.Layer that holds the animation
     animation : path of the SkelAnimation
-    frames : F values by the names of :data:`schemas.usd.LINEAGE`, all of them
+    frames : F values by the names of :data:`schemas.stage_contract.LINEAGE`, all of them
 
     Raises
     ------
@@ -70,7 +70,7 @@ def read_lineage(animation: Usd.Prim, time_codes: NDArray[np.float64]) -> dict[s
     Returns
     -------
     dict
-        F values by the names of :data:`schemas.usd.LINEAGE`; {} where the stage has none.
+        F values by the names of :data:`schemas.stage_contract.LINEAGE`; {} where the stage has none.
     """
     found = {name: animation.GetAttribute(name) for name in contract.LINEAGE}
     if not all(attribute and attribute.GetNumTimeSamples() for attribute in found.values()):

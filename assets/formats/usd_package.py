@@ -16,7 +16,7 @@ from pxr import Sdf
 from assets.formats import usd, usd_read
 from assets.formats.errors import FormatError
 from assets.formats.usd_cast import character_folder
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 _ZIP_HEADER_BYTES = 30
 """Of a local file header, by definition of ZIP."""

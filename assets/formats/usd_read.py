@@ -11,7 +11,7 @@ from pxr import Tf, Usd, UsdGeom, UsdSkel, Vt
 from assets.formats.errors import FormatError
 from kernels import rotation
 from kernels.types import Clip, Skeleton
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 def read_animation(path: str | Path) -> Clip:

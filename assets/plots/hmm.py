@@ -11,7 +11,7 @@ from kernels.hmm.evidence import Evidence
 from kernels.hmm.model import Model, Smoothing
 from kernels.hmm.states import States
 from kernels.motion.key_poses import to_poses
-from kernels.music.percussion import CONTOUR, FIRST_KEY, Hits
+from kernels.music.drums_and_melody import CONTOUR, FIRST_KEY, Hits
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Float, Int
 

@@ -11,9 +11,9 @@ import pyarrow as pa
 from assets.plots.draw import COOL, INK, SOFT, WARM, figure_of, markdown, picture, plain, png
 from assets.tables.matching import StoredMatches
 from assets.tables.pack import by_clip, to_numbers
-from kernels.matching.path import Chosen
+from kernels.matching.match_sequence import Chosen
 from kernels.matching.score import SCALE_DENOMINATOR
-from kernels.motion.features import FEATURE_RATE_HZ
+from kernels.motion.motion_features import FEATURE_RATE_HZ
 from kernels.music.segments import Segments
 from kernels.types import Float
 

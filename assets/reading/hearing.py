@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from assets.tables import hmm as hmm_tables
 from kernels.hmm.model import Model
-from kernels.music.percussion import CONTOUR, FIRST_KEY, N_KEYS, banded, heard_in, loudest_in, spread_bands
+from kernels.music.drums_and_melody import CONTOUR, FIRST_KEY, N_KEYS, banded, heard_in, loudest_in, spread_bands
 from kernels.types import Float
 
 SYMBOLS = (N_KEYS, len(CONTOUR))

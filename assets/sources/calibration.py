@@ -20,9 +20,9 @@ from assets.formats.suit_names import unknown_sensor
 from kernels import rotation
 from kernels.calibration.calibrate import calibrate
 from kernels.calibration.cleaning import clean
-from kernels.calibration.clip import Gauge, find_gauge, to_clip
 from kernels.calibration.poses import solve_poses
 from kernels.calibration.records import SENSORS, BodyPoses, Calibration, Cleaned, Recording, RecordingFinding
+from kernels.calibration.solved_clip import Gauge, find_gauge, to_clip
 from kernels.calibration.tree_solver import PoseSolver
 from kernels.types import Clip
 from schemas.settings import CalibrationSettings

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Protocol
 
-from assets.formats import settings, suit, tree
+from assets.formats import settings_file, suit, tree
 from assets.formats.clips_csv import Facts
 from assets.formats.errors import FormatError
 from assets.sources.performances import DancedClip, NamedSong, pair
@@ -229,7 +229,7 @@ def read_brief(studio: Studio, song: SongFile) -> Brief:
     FormatError
         If the brief cannot be read.
     """
-    return settings.read_brief(studio.file(song.brief)) if song.brief else Brief()
+    return settings_file.read_brief(studio.file(song.brief)) if song.brief else Brief()
 
 
 def brief_version(studio: Studio, songs: Iterable[SongFile]) -> str:
@@ -257,7 +257,7 @@ def brief_version(studio: Studio, songs: Iterable[SongFile]) -> str:
             continue
         place = studio.file(song.brief)
         try:
-            asked = settings.read_brief(place).beats
+            asked = settings_file.read_brief(place).beats
         except FormatError:
             said.append(tree.sha256(place))
             continue

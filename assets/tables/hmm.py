@@ -14,7 +14,7 @@ from kernels.hmm.evidence import Evidence
 from kernels.hmm.model import Model
 from kernels.hmm.states import States
 from kernels.motion.key_poses import KeyPoses, to_poses, to_vectors
-from kernels.music.percussion import CONTOUR, FIRST_KEY, N_KEYS, Contour, Hits
+from kernels.music.drums_and_melody import CONTOUR, FIRST_KEY, N_KEYS, Contour, Hits
 from kernels.types import Float, Int
 from schemas.hmm import BASIC_MOTION, CHOREOGRAPHY_MODEL, KEY_POSE, MUSIC_EVIDENCE, PERFORMANCE
 from schemas.music import MELODY, PERCUSSION

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from assets.tables.pack import by_clip, from_rows, to_numbers
 from kernels.matching.score import SCALE_DENOMINATOR, SCALES, Match
-from kernels.motion.features import MotionFeatures
-from kernels.music.features import MusicFeatures
+from kernels.motion.motion_features import MotionFeatures
+from kernels.music.music_features import MusicFeatures
 from kernels.music.repeats import Repeat
 from kernels.music.segments import Segments
 from kernels.types import Float, Int

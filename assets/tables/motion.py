@@ -16,7 +16,7 @@ from assets.tables.pack import (
     vector,
     vectors,
 )
-from kernels.motion.beats import MotionBeats
+from kernels.motion.motion_beats import MotionBeats
 from kernels.skeleton.canonical import JOINTS
 from kernels.skeleton.naming import JointMapping
 from kernels.skeleton.retarget import CanonicalMotion

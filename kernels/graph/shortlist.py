@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.graph.beat_features import BeatFeatures
 from kernels.graph.distance import PairDistance, pose_distance
-from kernels.graph.features import BeatFeatures
 from kernels.graph.nodes import BeatNodes
 from kernels.graph.transitions import LOCAL_BOUNDS, N_NEAREST, Nearest, nearest, rank_within
 from kernels.types import Float, Int

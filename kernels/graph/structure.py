@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kernels.graph.path import Path
-from kernels.graph.pins import Pin, Reach
+from kernels.graph.pin_conflicts import Pin, Reach
 from kernels.music.repeats import Repeat
 from kernels.types import Int
 

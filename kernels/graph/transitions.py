@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.graph.beat_features import BeatFeatures
 from kernels.graph.costs import PathCosts
 from kernels.graph.distance import (
     Metric,
@@ -31,7 +32,6 @@ from kernels.graph.distance import (
     paired_distance,
     pose_distance,
 )
-from kernels.graph.features import BeatFeatures
 from kernels.graph.nodes import BeatNodes
 from kernels.graph.prune import has_endless_dance
 from kernels.types import Float, Int, MotionGraph

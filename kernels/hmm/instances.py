@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.matching.path import viterbi
+from kernels.matching.match_sequence import viterbi
 from kernels.types import Float, Int
 from kernels.warp import EASY_WARP, WarpWeights
 

@@ -6,7 +6,8 @@ on its own while a blend lasts is no seam.
 
 Conventions
 -----------
-``L`` links, body-centred unit directions at 120 Hz (:func:`kernels.motion.features.link_directions`), weights of sum 1.
+``L`` links, body-centred unit directions at 120 Hz (:func:`kernels.motion.motion_features.link_directions`), weights of
+sum 1.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.motion.features import FEATURE_RATE_HZ
+from kernels.motion.motion_features import FEATURE_RATE_HZ
 from kernels.types import Float
 
 LIKE_NEIGHBOURS_PERCENTILE = 95.0

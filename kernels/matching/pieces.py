@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels.matching.score import SCALE_DENOMINATOR, similarity
-from kernels.motion.features import FEATURE_RATE_HZ
+from kernels.motion.motion_features import FEATURE_RATE_HZ
 from kernels.types import Float, Int
 
 SNAP_REACH_S = 0.12

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kernels.matching import intensity
 from kernels.matching.pieces import ease_pace, motion_under, snap_start
 from kernels.matching.score import SCALE_DENOMINATOR
-from kernels.motion.features import FEATURE_RATE_HZ
+from kernels.motion.motion_features import FEATURE_RATE_HZ
 from kernels.ranks import rank_correlation
 from kernels.types import Float
 from kernels.warp import WarpWeights, is_easy, warp_cost

@@ -21,7 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from kernels import rotation
-from kernels.motion.features import FEATURE_RATE_HZ, at_feature_rate
+from kernels.motion.motion_features import FEATURE_RATE_HZ, at_feature_rate
 from kernels.skeleton.canonical import JOINTS
 from kernels.types import Float, Int
 

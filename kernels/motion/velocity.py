@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from kernels.motion.beats import check_position
+from kernels.motion.motion_beats import check_position
 from kernels.types import Float, Int
 
 

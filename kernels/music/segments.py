@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kernels.motion.features import FEATURE_RATE_HZ
+from kernels.motion.motion_features import FEATURE_RATE_HZ
 from kernels.music.harmony import key_levels
 from kernels.music.onsets import FRAME_RATE_HZ, Samples, band_levels
 from kernels.types import Float, Int

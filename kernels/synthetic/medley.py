@@ -17,7 +17,7 @@ from kernels.calibration.records import PARENT, SENSORS
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS, LEG_LENGTH_M
 from kernels.synthetic.dancer import MOVES, Figure, SyntheticTake, pose
-from kernels.synthetic.suit import BoneMotion, SyntheticBody
+from kernels.synthetic.suit_performer import BoneMotion, SyntheticBody
 from kernels.types import Clip, Float
 
 _T_POSE_S, _RAMP_S = 1.5, 1.0

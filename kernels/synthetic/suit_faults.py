@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kernels.calibration.records import Recording, Severity
-from kernels.synthetic.suit import swap
+from kernels.synthetic.suit_performer import swap
 from kernels.types import Float
 
 ARM = ("shoulder", "upper_arm", "forearm", "hand")

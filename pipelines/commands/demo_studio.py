@@ -11,10 +11,10 @@ from assets.formats.audio import Audio
 from kernels.calibration.records import Recording
 from kernels.synthetic import rigs
 from kernels.synthetic.dancer import MOVES, SyntheticTake, take
+from kernels.synthetic.drum_machine import drum_machine_song
+from kernels.synthetic.hidden_rules import SyntheticPerformance, hidden_rules, perform
 from kernels.synthetic.medley import medley, wear
-from kernels.synthetic.music import drum_machine_song
-from kernels.synthetic.performance import SyntheticPerformance, hidden_rules, perform
-from kernels.synthetic.suit import Disturbance, make_body, record
+from kernels.synthetic.suit_performer import Disturbance, make_body, record
 from pipelines.studio.files import StudioError, write_beside
 
 SONG = "drum_machine"

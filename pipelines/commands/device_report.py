@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from assets.formats.settings import read_settings
+from assets.formats.settings_file import read_settings
 from pipelines.commands.outcome import DONE, SOME_REFUSED, Outcome
-from pipelines.devices import DeviceError, Devices, Tried
+from pipelines.device_fallback import DeviceError, Devices, Tried
 
 
 def report(root: Path) -> Outcome:

@@ -13,8 +13,8 @@ from assets.reading.clips import read_clips
 from assets.reading.songs import played_song
 from assets.tables.graph import to_motion_graph
 from assets.tables.music import to_music_beat
-from pipelines import build as building
-from pipelines.commands.asked import pin_texts, wanted_songs
+from pipelines import build
+from pipelines.commands.arguments import pin_texts, wanted_songs
 from pipelines.commands.outcome import DONE, NOTHING_DONE, Outcome
 from pipelines.commands.session import Session
 from pipelines.io_managers import StoredTable
@@ -120,7 +120,7 @@ def propose_pins(
         raise StudioError(f"--propose: want one song, got {len(songs)}")
     key = f"{songs[0].key}|{USUAL}"
     needed = {name for name in work.state.needed_for(key) if work.state.assets[name].kind != "dance"}
-    report = work.run(building.GROUPS, keys=lambda kind, one: kind != "song" or one == songs[0].key, assets=needed)
+    report = work.run(build.GROUPS, keys=lambda kind, one: kind != "song" or one == songs[0].key, assets=needed)
     try:
         return priced(studio, songs[0].key, place, pins)
     except LakeError as error:

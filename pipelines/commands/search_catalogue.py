@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from assets.formats import bvh, motion_index
 from assets.formats.errors import FormatError
 from assets.formats.file_names import file_name
-from assets.formats.settings import read_settings
+from assets.formats.settings_file import read_settings
 from assets.tables import pack
 from assets.tables import search as search_tables
 from kernels.search.encoder import Encoder, from_arrays

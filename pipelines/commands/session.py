@@ -10,10 +10,10 @@ from assets.formats.errors import FormatError
 from assets.motion import beat_settings
 from assets.stamps import Progress
 from kernels.skeleton.canonical import JOINTS
-from pipelines import build as building
+from pipelines import build
 from pipelines.collection import freshness
 from pipelines.definitions import build_definitions
-from pipelines.devices import DeviceError, Devices, to_standard_error
+from pipelines.device_fallback import DeviceError, Devices, to_standard_error
 from pipelines.studio.files import StudioError
 from pipelines.studio.folder import StudioFolder
 
@@ -36,15 +36,15 @@ class Session:
         *,
         keys: Callable[[str, str], bool] | None = None,
         assets: Container[str] | None = None,
-    ) -> building.Report:
+    ) -> build.Report:
         """Bring groups of assets, or some assets of them, up to date."""
         bar: Progress = self._progress()
         try:
-            with building.exclusive(self.studio):
-                instance = building.open_instance(self.studio)
-                building.clear_after_kill(self.studio, instance)
+            with build.exclusive(self.studio):
+                instance = build.open_instance(self.studio)
+                build.clear_after_kill(self.studio, instance)
                 definitions = build_definitions(self.studio, progress=bar, devices=self.devices)
-                return building.bring_up_to_date(
+                return build.bring_up_to_date(
                     self.studio,
                     definitions.resolve_job_def,
                     instance,

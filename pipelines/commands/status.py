@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from assets.stamps import content_version
-from pipelines import build as building
+from pipelines import build
 from pipelines.collection import freshness
 from pipelines.commands import device_report
 from pipelines.commands.outcome import DONE, SOME_REFUSED, Outcome
@@ -18,13 +18,13 @@ LONGEST_LIST = 40
 """Lines. Chosen by hand, to fit on a screen."""
 
 
-def status(root: Path, *, devices: bool = False) -> Outcome:
+def studio_status(root: Path, *, devices: bool = False) -> Outcome:
     """Say what is fresh, stale, failed or refused; of the devices too, for which no studio is needed."""
     if devices:
         of_devices = device_report.report(root)
         if not root.is_dir():
             return of_devices
-        found = status(root)
+        found = studio_status(root)
         return Outcome(
             max(found.status, of_devices.status),
             found.facts | of_devices.facts,
@@ -37,7 +37,7 @@ def status(root: Path, *, devices: bool = False) -> Outcome:
     findings = state.findings()
     unmade = {(f.asset, f.key) for f in findings if f.state in ("stale", "missing")}
     is_begun = studio.dagster_home.is_dir()
-    failures = building.last_failures(building.open_instance(studio), state, unmade) if is_begun else {}
+    failures = build.last_failures(build.open_instance(studio), state, unmade) if is_begun else {}
     assets = [_asset_facts(f, state, failures) for f in findings]
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
     notes = list(state.sources.notes)

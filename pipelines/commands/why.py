@@ -13,7 +13,7 @@ from assets.dancing import licences
 from assets.stage import lineage_of
 from assets.tables.pack import frame_rate_hz
 from pipelines.collection import freshness
-from pipelines.commands.asked import briefed_method, wanted_songs
+from pipelines.commands.arguments import briefed_method, wanted_songs
 from pipelines.commands.outcome import DONE, Outcome
 from pipelines.studio.files import StudioError
 from pipelines.studio.folder import StudioFolder, existing
@@ -24,7 +24,7 @@ STAGE_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 
 @dataclass(frozen=True)
 class Told:
-    """What is known of a dance: a value a frame by the names of ``schemas.usd.LINEAGE``, its clips, its licence."""
+    """What is known of a dance: a value a frame by the names of the contract's ``LINEAGE``, its clips, its licence."""
 
     name: str
     frame_rate_hz: float

@@ -9,7 +9,7 @@ from pathlib import Path
 from upath import UPath
 
 from assets.formats.file_names import WINDOWS, file_name, key_of
-from assets.formats.settings import read_settings
+from assets.formats.settings_file import read_settings
 from assets.formats.tree import HashCache
 from assets.sources import scan, sources
 from assets.sources.sources import Request, SongFile, Sources

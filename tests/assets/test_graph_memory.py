@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from assets.graph_memory import Beats, keep, near_pairs, recall
-from kernels.graph.features import beat_features
+from kernels.graph.beat_features import beat_features
 from kernels.graph.nodes import beat_nodes
 from kernels.skeleton.kinematics import place
 from kernels.synthetic.dancer import take

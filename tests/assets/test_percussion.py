@@ -4,7 +4,7 @@ import pytest
 
 from assets.formats import midi
 from assets.formats.errors import FormatError
-from kernels.music.percussion import FIRST_KEY, LAST_KEY, band_hits, contour, drum_hits
+from kernels.music.drums_and_melody import FIRST_KEY, LAST_KEY, band_hits, contour, drum_hits
 from kernels.music.preview import render_preview
 
 

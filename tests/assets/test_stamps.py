@@ -7,7 +7,7 @@ from assets import stamps
 from assets.stamps import ClipStamp, Stamp, content_version
 from assets.tables import pack
 from assets.tables.motion import from_motion_beat, from_pose, from_skeleton
-from kernels.motion.beats import motion_beats
+from kernels.motion.motion_beats import motion_beats
 from kernels.synthetic.dancer import place, take
 from schemas.motion import MOTION_BEAT
 

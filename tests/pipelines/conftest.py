@@ -8,9 +8,9 @@ import pytest
 from assets.formats import audio, bvh
 from assets.formats.audio import Audio
 from kernels.synthetic.dancer import take
-from kernels.synthetic.music import drum_machine_song
-from pipelines.commands.build import build_studio
-from pipelines.commands.dance import dance_songs
+from kernels.synthetic.drum_machine import drum_machine_song
+from pipelines.commands.build_studio import build_studio
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.resources import NoProgress
 
 TAKES = {"ayame": ("step", "twist", "wave"), "kaede": ("rock", "kick")}

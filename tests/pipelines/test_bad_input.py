@@ -12,7 +12,7 @@ import pytest
 from assets.formats import audio
 from assets.formats.audio import Audio
 from kernels.synthetic.dancer import take
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError
 

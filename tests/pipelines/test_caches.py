@@ -94,7 +94,7 @@ def test_a_folder_is_writable_when_a_file_fits(tmp_path, nowhere):
 @pytest.mark.opencl
 @pytest.mark.parametrize("home", ["/proc/no such home", None])
 def test_devices_are_found_without_a_home(home, tmp_path):
-    code = "from pipelines.devices import found_devices; print(len(found_devices()))"
+    code = "from pipelines.device_fallback import found_devices; print(len(found_devices()))"
     environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "XDG_CACHE_HOME", *FOLDERS)}
     environment |= {"TMPDIR": str(tmp_path)} | ({"HOME": home} if home else {})
     usual = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -16,7 +16,7 @@ from assets.formats import usd_check, usd_package, usd_read
 from assets.tables.pack import to_array
 from pipelines.collection import ASSETS
 from pipelines.commands import dance_report
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.freshness import ON_DEMAND, nodes
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError

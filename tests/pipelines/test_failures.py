@@ -9,8 +9,8 @@ import pytest
 from assets.sources.sources import Request
 from pipelines import build as building
 from pipelines.collection import freshness
-from pipelines.commands.dance import dance_songs
-from pipelines.commands.status import status
+from pipelines.commands.dance_songs import dance_songs
+from pipelines.commands.status import studio_status
 from pipelines.definitions import build_definitions
 from pipelines.freshness import Freshness
 from pipelines.resources import NoProgress
@@ -54,7 +54,7 @@ def remember(studio):
 
 def told(root):
     """States of the choreographies, and why they are so."""
-    found = [facts for facts in status(root).facts["assets"] if facts["asset"] == "choreography"]
+    found = [facts for facts in studio_status(root).facts["assets"] if facts["asset"] == "choreography"]
     return {facts["partition"]: (facts["state"], facts["why"]) for facts in found}
 
 
@@ -74,11 +74,11 @@ def test_a_refused_pin_is_never_told_as_the_reason_for_another_staleness(studio,
     assert (outcome.status, outcome.facts["conflict"]) == (2, ["2=setp"])
     assert last_run(studio).status == dg.DagsterRunStatus.FAILURE
     assert content(studio) == before
-    assert {facts["state"] for facts in status(studio).facts["assets"]} == {"fresh"}
+    assert {facts["state"] for facts in studio_status(studio).facts["assets"]} == {"fresh"}
     (studio / "odori.toml").write_text("[path]\nseam_cost = 1.5\n")
     assert told(studio) == {"beat|graph": ("stale", "settings [path], [dance.blend_s] changed")}
     (studio / "odori.toml").unlink()
-    assert {facts["state"] for facts in status(studio).facts["assets"]} == {"fresh"}
+    assert {facts["state"] for facts in studio_status(studio).facts["assets"]} == {"fresh"}
 
 
 def test_a_failure_is_told_while_its_inputs_stay_and_retried_when_they_change(studio, dance, brief, build):

@@ -27,7 +27,7 @@ METHOD = replace(by_graph.METHOD, name="toy", version="1", choose=choose, has_al
 
 ASK = """
 import sys
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.resources import NoProgress
 done = dance_songs(sys.argv[1], ["beat"], method="toy", frame_rate_hz=None, out=None, progress=NoProgress)
 print(done.status, done.facts.get("method"), done.troubles)

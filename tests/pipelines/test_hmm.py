@@ -8,9 +8,9 @@ import pytest
 
 from assets.formats import bvh, midi
 from kernels.music.notes import sorted_notes
-from kernels.synthetic import performance as made_up
+from kernels.synthetic import hidden_rules as made_up
 from pipelines.collection import freshness
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.commands.hmm_report import dance_notes, model_facts
 from pipelines.resources import NoProgress
 from pipelines.studio.folder import StudioFolder

@@ -17,7 +17,7 @@ from kernels.matching.score import reference_matches, similarity
 from kernels.synthetic.dancer import take
 from kernels.types import Clip
 from pipelines.collection import freshness
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.resources import NoProgress
 from pipelines.studio.folder import StudioFolder
 

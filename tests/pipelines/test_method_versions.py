@@ -23,7 +23,7 @@ of = importlib.import_module(f"assets.dancing.by_{name}")
 of.METHOD = dataclasses.replace(of.METHOD, version=of.METHOD.version + ".1")
 
 from pipelines.collection import freshness
-from pipelines.commands.build import build_studio
+from pipelines.commands.build_studio import build_studio
 from pipelines.resources import NoProgress
 from pipelines.studio.folder import StudioFolder
 

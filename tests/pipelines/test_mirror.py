@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 from assets.tables import pack
 from assets.tables.motion import to_canonical_pose
 from kernels.skeleton.canonical import JOINTS, mirror
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.commands.propose import propose_pins
 from pipelines.commands.why import explain_dance
 from pipelines.resources import NoProgress

@@ -7,8 +7,8 @@ import polars as pl
 import pytest
 
 from assets.formats import usd_read
-from pipelines.commands.dance import dance_songs
-from pipelines.commands.status import status
+from pipelines.commands.dance_songs import dance_songs
+from pipelines.commands.status import studio_status
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError
 
@@ -55,7 +55,7 @@ def test_conflicts_name_the_pins_and_ways_out(studio, dance):
     both = dance(pins=["3=kick", "3=step"])
     assert both.status == 2
     assert both.facts["conflict"] == ["3=kick", "3=step"]
-    assert status(studio).status == 0
+    assert studio_status(studio).status == 0
     assert dance().status == 0
 
 

@@ -4,8 +4,8 @@ import pytest
 
 from kernels.calibration.tree_solver import Stream, make_model
 from kernels.opencl.device import list_devices
-from kernels.synthetic import suit
-from pipelines.devices import Devices
+from kernels.synthetic import suit_performer
+from pipelines.device_fallback import Devices
 from pipelines.solvers import PoseSolvers
 
 METHODS = ("gauss_newton", "springs")
@@ -13,8 +13,8 @@ METHODS = ("gauss_newton", "springs")
 
 @pytest.fixture
 def problem():
-    how = suit.Disturbance(outlier_ratio=0.0, dropped_ratio=0.0)
-    made = suit.made_up(5, n_frames=60, disturbance=how)
+    how = suit_performer.Disturbance(outlier_ratio=0.0, dropped_ratio=0.0)
+    made = suit_performer.made_up(5, n_frames=60, disturbance=how)
     model = make_model(made.body.in_parent_sensor_m, made.body.in_child_sensor_m)
     return model, Stream(made.recording.position_xyz_m, made.recording.rotation_wxyz, np.ones((60, 17)))
 

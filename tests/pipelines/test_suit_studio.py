@@ -14,10 +14,10 @@ from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.synthetic.dancer import take
 from kernels.synthetic.medley import medley, wear
-from kernels.synthetic.suit import Disturbance, made_up, make_body, record
+from kernels.synthetic.suit_performer import Disturbance, made_up, make_body, record
 from pipelines.collection import freshness
-from pipelines.commands.build import build_studio
-from pipelines.commands.status import status
+from pipelines.commands.build_studio import build_studio
+from pipelines.commands.status import studio_status
 from pipelines.resources import NoProgress
 from pipelines.studio.folder import StudioFolder
 
@@ -105,7 +105,7 @@ def _facing(place, hips):
 def test_everything_is_fresh_and_status_says_what_is_doubtful(built_suit):
     root, _ = built_suit
     assert all(f.state == "fresh" for f in freshness(StudioFolder(root)).findings())
-    found = status(root)
+    found = studio_status(root)
     said = [(doubt["path"], doubt["warning"]) for doubt in found.facts["warnings"]]
     assert said == [("clips/suit/medley.parquet", warning) for warning in rows(root)["medley.parquet"]["warnings"]]
     assert all(f"warning: {path}: {warning}" in found.report for path, warning in said)

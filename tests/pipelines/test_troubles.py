@@ -11,8 +11,8 @@ from assets.formats import bvh
 from kernels.synthetic.dancer import take
 from pipelines import build as building
 from pipelines.collection import freshness
-from pipelines.commands.dance import dance_songs
-from pipelines.commands.status import status
+from pipelines.commands.dance_songs import dance_songs
+from pipelines.commands.status import studio_status
 from pipelines.definitions import build_definitions
 from pipelines.resources import NoProgress
 from pipelines.studio.files import LakeError, StudioError
@@ -44,14 +44,14 @@ def failing_session(monkeypatch):
     """Make the motion beats of one session fail."""
     from assets import motion
 
-    real = motion.plots.session_beats
+    real = motion.session_beats
 
     def plot(table, clips):
         if "kaede" in clips["session"].to_pylist():
             raise RuntimeError("the plotter broke")
         return real(table, clips)
 
-    monkeypatch.setattr(motion.plots, "session_beats", plot)
+    monkeypatch.setattr(motion, "session_beats", plot)
 
 
 def test_one_failing_session_stops_no_other(fresh_studio, build, failing_session):
@@ -63,7 +63,7 @@ def test_one_failing_session_stops_no_other(fresh_studio, build, failing_session
     assert state.state("motion_beat", "ayame").state == "fresh"
     assert state.state("music_beat", "beat").state == "fresh"
     assert pq.read_table(fresh_studio / "lake" / "motion_graph_node" / "all.parquet").num_rows > 0
-    failed = [a for a in status(fresh_studio).facts["assets"] if a["state"] == "failed"]
+    failed = [a for a in studio_status(fresh_studio).facts["assets"] if a["state"] == "failed"]
     assert ("motion_beat", "kaede") in {(a["asset"], a["partition"]) for a in failed}
     assert any("the plotter broke" in a["why"] for a in failed)
     danced = dance_songs(fresh_studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
@@ -164,6 +164,6 @@ def test_the_tracker_that_was_asked_for_is_used(studio, build):
 
 
 def test_status_tells_machines_what_failed(studio):
-    facts = status(studio).facts
+    facts = studio_status(studio).facts
     assert json.loads(json.dumps(facts)) == facts
     assert {a["state"] for a in facts["assets"]} == {"fresh"}

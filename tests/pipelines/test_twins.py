@@ -4,8 +4,8 @@ import pyopencl as cl
 import pytest
 
 from kernels.opencl.device import list_devices
-from pipelines.commands.build import build_studio
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.build_studio import build_studio
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.resources import NoProgress
 from pipelines.studio.folder import StudioFolder
 
@@ -67,7 +67,7 @@ def test_matches_on_the_reference_are_the_same(matched, tmp_path, monkeypatch, h
 
 
 def test_without_opencl_a_studio_is_built_and_danced(fresh_studio, monkeypatch, capsys, built):
-    monkeypatch.setattr("pipelines.devices.found_devices", tuple)
+    monkeypatch.setattr("pipelines.device_fallback.found_devices", tuple)
     assert build(fresh_studio).status == 0
     outcome = dance_songs(fresh_studio, ["beat"], method="graph", frame_rate_hz=None, out=None, progress=NoProgress)
     assert outcome.status == 0, outcome.troubles

@@ -7,9 +7,9 @@ from assets.dancing.by_matching import by_matching, directions_of
 from assets.dancing.match_pieces import LoadedMatches, places_of
 from assets.dancing.refusal import RefusalError
 from assets.tables.matching import StoredMatches
-from kernels.matching.joints import joints_of
+from kernels.matching.piece_joints import joints_of
 from kernels.matching.price import ClipFeatures, MatchPiece
-from kernels.motion.features import bumps, link_weights
+from kernels.motion.motion_features import bumps, link_weights
 from kernels.music.segments import Segments
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from schemas.settings import MatchPathSettings, Settings

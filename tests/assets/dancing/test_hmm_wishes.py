@@ -3,7 +3,7 @@ import pytest
 
 from assets.dancing.asked import SOFT_WISH, Direction
 from assets.dancing.hmm_wishes import price, served
-from kernels.graph.pins import Pin
+from kernels.graph.pin_conflicts import Pin
 
 
 def pin(name, first, last):

@@ -6,7 +6,7 @@ import pytest
 from assets.dancing.match_pieces import LoadedMatches, pieces_of
 from assets.tables.matching import StoredMatches
 from kernels.matching.price import ClipFeatures
-from kernels.motion.features import bumps
+from kernels.motion.motion_features import bumps
 from kernels.music.segments import Segments
 from schemas.settings import MatchPathSettings
 

@@ -15,7 +15,7 @@ from assets.tables.motion import CanonicalClip, from_canonical_pose
 from kernels.graph.costs import PathCosts
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.path import STEPS, find_path
-from kernels.graph.pins import Reach, admitted, step_price
+from kernels.graph.pin_conflicts import Reach, admitted, step_price
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.kinematics import forward
 from kernels.types import BeatGrid, MotionGraph

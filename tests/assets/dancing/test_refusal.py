@@ -1,7 +1,7 @@
 import dagster as dg
 import pytest
 
-from assets.dancing.danced import Markdown
+from assets.dancing.chosen_steps import Markdown
 from assets.dancing.refusal import RefusalError
 from assets.declare import refusals_fail, shown
 

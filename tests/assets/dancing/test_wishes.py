@@ -7,7 +7,7 @@ import pytest
 
 from assets.dancing.wishes import DirectionError, Nodes, kept, sentences, stretch, to_pin, way_out
 from assets.reading.songs import PlayedSong
-from kernels.graph.pins import Conflict, WayOut
+from kernels.graph.pin_conflicts import Conflict, WayOut
 from kernels.types import BeatGrid
 from schemas.pins import parse_pin
 

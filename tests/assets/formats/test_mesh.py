@@ -8,7 +8,7 @@ from assets.formats.mesh import body
 from kernels.skeleton.canonical import BODY_HEIGHT_M, CANONICAL, JOINTS
 from kernels.skeleton.kinematics import rest_position
 from kernels.types import Skeleton
-from schemas.usd import SIDES
+from schemas.stage_contract import SIDES
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from assets.formats import suit
 from assets.formats.errors import FormatError
-from kernels.synthetic.suit import made_up
+from kernels.synthetic.suit_performer import made_up
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from assets.formats import suit_long
 from assets.formats.errors import FormatError
 from assets.formats.suit_columns import Columns, parse_csv
 from kernels.calibration.records import SENSORS
-from kernels.synthetic.suit import made_up
+from kernels.synthetic.suit_performer import made_up
 
 TWO = """frame,time_s,sensor,px_m,py_m,pz_m,qw,qx,qy,qz,is_valid
 0,0.00,head,1,2,3,1,0,0,0,1

@@ -9,7 +9,7 @@ from assets.formats.suit_columns import parse_csv
 from kernels import rotation
 from kernels.calibration.cleaning import clean
 from kernels.calibration.records import SENSORS
-from kernels.synthetic.suit import Disturbance, made_up
+from kernels.synthetic.suit_performer import Disturbance, made_up
 
 
 def header(n):

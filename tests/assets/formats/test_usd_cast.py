@@ -3,7 +3,7 @@
 import pytest
 
 from assets.formats import usd_cast, usd_character
-from kernels.skeleton.fit import fit
+from kernels.skeleton.body_fit import fit
 from kernels.types import Clip
 
 

@@ -7,8 +7,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 from assets.formats import usd_cast, usd_character, usd_check, usd_package
 from assets.formats.errors import FormatError
 from kernels.skeleton import kinematics
+from kernels.skeleton.body_fit import fit
 from kernels.skeleton.canonical import JOINTS
-from kernels.skeleton.fit import fit
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pxr import Usd, UsdSkel
 
 from assets.formats import usd, usd_check, usd_package
 from assets.formats.usd_contract import StageFinding
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdMedia, UsdSkel, Vt
 
 from assets.formats import usd, usd_contract
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.types import Clip, Skeleton
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 REPOSITORY = Path(__file__).parents[3]
 SCRIPT = Path(__file__).with_name("blender_joints.py")

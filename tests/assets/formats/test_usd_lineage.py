@@ -5,7 +5,7 @@ import pytest
 from pxr import Usd
 
 from assets.formats import usd, usd_check, usd_lineage, usd_read
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 def frames(n):

@@ -7,7 +7,7 @@ from pxr import Usd, UsdMedia
 
 from assets.formats import usd, usd_package, usd_read
 from assets.formats.errors import FormatError
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from kernels import rotation
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.types import Clip, Skeleton
-from schemas import usd as contract
+from schemas import stage_contract as contract
 
 
 @pytest.fixture

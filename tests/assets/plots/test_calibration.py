@@ -6,7 +6,7 @@ from assets.plots import calibration as calibration_plots
 from assets.sources.calibration import calibrate_recording
 from assets.tables import pack
 from assets.tables.calibration import from_calibration
-from kernels.synthetic.suit import made_up
+from kernels.synthetic.suit_performer import made_up
 from schemas.calibration import CALIBRATION
 from schemas.settings import CalibrationSettings
 

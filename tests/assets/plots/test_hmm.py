@@ -11,7 +11,7 @@ from assets.plots import hmm as hmm_plots
 from kernels.hmm.evidence import Evidence
 from kernels.hmm.model import Performed, Smoothing, learn
 from kernels.hmm.states import States
-from kernels.music.percussion import Hits
+from kernels.music.drums_and_melody import Hits
 
 
 def test_pictures_are_drawn_and_the_same_twice():

@@ -4,10 +4,10 @@ import numpy as np
 
 from assets.plots import matching as mp
 from assets.tables import matching as mt
-from kernels.matching.path import Chosen
+from kernels.matching.match_sequence import Chosen
 from kernels.matching.price import MatchPiece
 from kernels.matching.score import Match
-from kernels.motion.features import MotionFeatures
+from kernels.motion.motion_features import MotionFeatures
 from kernels.music.segments import Segments
 from schemas.motion import MOTION_FEATURE
 

@@ -6,7 +6,7 @@ import re
 from assets.plots.motion import session_beats
 from assets.tables import pack
 from assets.tables.motion import from_motion_beat
-from kernels.motion.beats import motion_beats
+from kernels.motion.motion_beats import motion_beats
 from kernels.synthetic.dancer import place, take
 from schemas.motion import CLIP, MOTION_BEAT
 

@@ -6,7 +6,7 @@ import pytest
 from assets.reading.hearing import SYMBOLS, hear
 from assets.tables import hmm as hmm_tables
 from kernels.hmm.model import Performed, Smoothing, learn
-from kernels.music.percussion import FIRST_KEY, Contour, Hits
+from kernels.music.drums_and_melody import FIRST_KEY, Contour, Hits
 
 EDGE_S = np.array([0.0, 1.0, 2.0])
 

@@ -8,7 +8,7 @@ import pytest
 from assets.formats import suit
 from assets.sources.calibration import CalibrationError, calibrate_file, calibrate_recording, in_order, up_axis
 from kernels.calibration.records import SENSORS, Recording
-from kernels.synthetic.suit import made_up
+from kernels.synthetic.suit_performer import made_up
 from schemas.settings import CalibrationSettings
 
 USUAL = CalibrationSettings()

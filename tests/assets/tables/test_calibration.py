@@ -9,7 +9,7 @@ from assets.tables.calibration import N_SPANS, from_calibration, to_curves
 from kernels import rotation
 from kernels.calibration.records import JOINTS, SENSORS
 from kernels.skeleton import kinematics
-from kernels.synthetic.suit import made_up
+from kernels.synthetic.suit_performer import made_up
 from schemas.settings import CalibrationSettings
 
 

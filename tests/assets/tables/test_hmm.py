@@ -9,7 +9,7 @@ from kernels.hmm.evidence import Evidence
 from kernels.hmm.model import Performed, Smoothing, learn
 from kernels.hmm.states import States
 from kernels.motion.key_poses import KeyPoses
-from kernels.music.percussion import Contour, Hits
+from kernels.music.drums_and_melody import Contour, Hits
 from schemas.music import PERCUSSION
 
 

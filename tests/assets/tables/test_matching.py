@@ -6,8 +6,8 @@ import pytest
 
 from assets.tables import matching as mt
 from kernels.matching.score import Match
-from kernels.motion.features import MotionFeatures
-from kernels.music.features import MusicFeatures
+from kernels.motion.motion_features import MotionFeatures
+from kernels.music.music_features import MusicFeatures
 from kernels.music.repeats import Repeat
 from kernels.music.segments import Segments
 from schemas.matching import MATCH

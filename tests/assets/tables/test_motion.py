@@ -13,7 +13,7 @@ from assets.tables.motion import (
     to_pose,
     to_skeleton,
 )
-from kernels.motion.beats import motion_beats
+from kernels.motion.motion_beats import motion_beats
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget

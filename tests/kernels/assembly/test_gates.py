@@ -13,8 +13,8 @@ from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.foot_quality import foot_measures, knee_measures, slip_measures
 from kernels.assembly.quality import warp_measures
 from kernels.assembly.seam_quality import seam_measures
+from kernels.graph.beat_features import beat_features, concatenate_beats
 from kernels.graph.costs import PathCosts
-from kernels.graph.features import beat_features, concatenate_beats
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.path import find_path, to_choreography
 from kernels.graph.transitions import find_transitions

@@ -6,12 +6,12 @@ from kernels.calibration.calibrate import calibrate
 from kernels.calibration.cleaning import clean
 from kernels.calibration.joints import solve_joints
 from kernels.calibration.poses import solve_poses
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 
 @pytest.fixture(scope="session")
 def made():
-    return suit.made_up(7, n_frames=3000)
+    return suit_performer.made_up(7, n_frames=3000)
 
 
 @pytest.fixture(scope="session")
@@ -37,4 +37,4 @@ def poses(cleaned, calibration):
 @pytest.fixture(scope="session")
 def perfect():
     """Without noise, outliers or gaps."""
-    return suit.made_up(8, n_frames=3000, disturbance=suit.CLEAN)
+    return suit_performer.made_up(8, n_frames=3000, disturbance=suit_performer.CLEAN)

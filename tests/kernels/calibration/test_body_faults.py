@@ -8,7 +8,7 @@ from kernels.calibration.body_faults import find_body_faults, move_to_repeat
 from kernels.calibration.cleaning import clean
 from kernels.calibration.joints import solve_joints
 from kernels.calibration.records import SENSORS
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 
 def faults(made):
@@ -21,33 +21,35 @@ def test_good_bodies_have_none(cleaned, pairs):
 
 
 def test_a_joint_that_does_not_move_is_an_error_with_a_remedy():
-    found = faults(suit.made_up(3, n_frames=2500, frozen=("head",)))
+    found = faults(suit_performer.made_up(3, n_frames=2500, frozen=("head",)))
     assert [(one.severity, one.sensor) for one in found] == [("error", "head")]
     assert "head rolls" in found[0].sentence
 
 
 def test_an_exact_hinge_is_a_warning():
-    found = faults(suit.made_up(3, n_frames=3000, hinged=("l_shank", "r_shank")))
+    found = faults(suit_performer.made_up(3, n_frames=3000, hinged=("l_shank", "r_shank")))
     assert [(one.severity, one.sensor) for one in found] == [("warning", "l_shank"), ("warning", "r_shank")]
 
 
 @pytest.mark.parametrize(("one", "other"), [("pelvis", "r_foot"), ("thorax", "head"), ("l_hand", "r_hand")])
 def test_exchanged_labels_are_both_named(made, one, other):
-    cleaned = clean(suit.swap(made.recording, {one: other}))
+    cleaned = clean(suit_performer.swap(made.recording, {one: other}))
     found = find_body_faults(cleaned, solve_joints(cleaned))
     assert found[0].severity == "error"
     assert {one, other} == set(found[0].sentence.split(":")[0].split(", "))
 
 
 def test_labels_exchanged_in_a_ring_are_told_step_by_step(made):
-    ring = suit.swap(suit.swap(made.recording, {"l_upper_arm": "l_forearm"}), {"l_forearm": "l_hand"})
+    ring = suit_performer.swap(
+        suit_performer.swap(made.recording, {"l_upper_arm": "l_forearm"}), {"l_forearm": "l_hand"}
+    )
     cleaned = clean(ring)
     found = [one for one in find_body_faults(cleaned, solve_joints(cleaned)) if "exchange the labels" in one.sentence]
     assert len(found) == 2
     mended = ring
     for one in found:
         a, b = one.sentence.split(":")[0].split(", ")
-        mended = suit.swap(mended, {a: b})
+        mended = suit_performer.swap(mended, {a: b})
     np.testing.assert_array_equal(mended.is_valid, made.recording.is_valid)
 
 

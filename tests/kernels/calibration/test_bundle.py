@@ -5,7 +5,7 @@ import numpy as np
 from kernels.calibration.bundle import adjust
 from kernels.calibration.cleaning import clean
 from kernels.calibration.joints import solve_joints
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 
 def error_m(anchors, made):
@@ -37,7 +37,7 @@ def test_joints_moved_off_come_back(made, cleaned, pairs):
 def test_it_helps_where_tissue_wobbles():
     before, after = [], []
     for seed in (51, 52):
-        made = suit.made_up(seed, n_frames=4000, disturbance=suit.Disturbance(wobble_m=0.006))
+        made = suit_performer.made_up(seed, n_frames=4000, disturbance=suit_performer.Disturbance(wobble_m=0.006))
         cleaned = clean(made.recording)
         pairs = solve_joints(cleaned)
         before.append(error_m(apart(pairs), made))
@@ -46,7 +46,7 @@ def test_it_helps_where_tissue_wobbles():
 
 
 def test_directions_that_are_not_seen_stay():
-    made = suit.made_up(3, n_frames=3000, hinged=("l_shank",))
+    made = suit_performer.made_up(3, n_frames=3000, hinged=("l_shank",))
     cleaned = clean(made.recording)
     pairs = solve_joints(cleaned)
     in_parent, in_child = adjust(cleaned, pairs)

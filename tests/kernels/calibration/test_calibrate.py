@@ -6,7 +6,7 @@ import pytest
 from kernels.calibration.calibrate import bone_lengths, calibrate
 from kernels.calibration.cleaning import clean
 from kernels.calibration.records import JOINTS, PARENT, SENSORS
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 
 def test_joints_of_a_made_up_body(made, calibration):
@@ -54,7 +54,7 @@ def test_joints_are_given_to_ten_nanometres(calibration):
 
 
 def test_what_is_rated_high_is_near():
-    made = suit.made_up(41, n_frames=4000, disturbance=suit.Disturbance(wobble_m=0.01))
+    made = suit_performer.made_up(41, n_frames=4000, disturbance=suit_performer.Disturbance(wobble_m=0.01))
     found = calibrate(clean(made.recording))
     off = np.linalg.norm(found.in_child_sensor_m - made.body.in_child_sensor_m, axis=-1)
     assert all(off[k] < 0.03 for k, joint in enumerate(found.joints) if joint.confidence == "high")

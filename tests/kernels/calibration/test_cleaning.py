@@ -6,7 +6,7 @@ import pytest
 from kernels import rotation
 from kernels.calibration.cleaning import clean, low_pass, noise
 from kernels.calibration.records import SENSORS, Recording
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 
 def test_noise_is_measured_under_motion(made, cleaned):
@@ -60,7 +60,7 @@ def test_low_pass_keeps_slow_and_stops_fast():
 
 
 def test_a_sensor_that_says_nothing_is_named():
-    made = suit.made_up(1, n_frames=400)
+    made = suit_performer.made_up(1, n_frames=400)
     is_valid = made.recording.is_valid.copy()
     is_valid[:, 4] = False
     found = clean(replace(made.recording, is_valid=is_valid))
@@ -76,8 +76,8 @@ def test_no_frames_give_none():
 
 
 def test_slow_trackers_raise_no_alarm():
-    body = suit.make_body(4)
-    made = suit.record(body, suit.range_of_motion(4, n_frames=2000, frame_rate_hz=30.0), seed=4)
+    body = suit_performer.make_body(4)
+    made = suit_performer.record(body, suit_performer.range_of_motion(4, n_frames=2000, frame_rate_hz=30.0), seed=4)
     assert clean(made.recording).findings == ()
 
 

@@ -7,7 +7,7 @@ from kernels.calibration.calibrate import calibrate
 from kernels.calibration.cleaning import clean
 from kernels.calibration.faults import check_recording, check_sensors
 from kernels.calibration.records import SENSORS
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 from kernels.synthetic.suit_faults import FAULTS
 
 
@@ -27,7 +27,7 @@ def test_every_fault_is_found_with_sensor_and_remedy(made, name):
 @pytest.mark.parametrize("wobble_m", [0.0, 0.012])
 def test_no_alarm_on_good_recordings(wobble_m):
     for seed in (31, 32):
-        made = suit.made_up(seed, n_frames=4000, disturbance=suit.Disturbance(wobble_m=wobble_m))
+        made = suit_performer.made_up(seed, n_frames=4000, disturbance=suit_performer.Disturbance(wobble_m=wobble_m))
         assert judge(made.recording) == ()
 
 

@@ -6,7 +6,7 @@ import pytest
 from kernels.calibration.cleaning import clean
 from kernels.calibration.joint_outliers import judge_by_joints
 from kernels.calibration.records import SENSORS
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 HAND, FOREARM = SENSORS.index("l_hand"), SENSORS.index("l_forearm")
 
@@ -14,8 +14,8 @@ HAND, FOREARM = SENSORS.index("l_hand"), SENSORS.index("l_forearm")
 @pytest.fixture(scope="module")
 def quiet():
     """With noise, but without outliers or drop-outs."""
-    noise = suit.Disturbance(outlier_ratio=0.0, dropped_ratio=0.0)
-    recording = suit.made_up(9, n_frames=1500, disturbance=noise).recording
+    noise = suit_performer.Disturbance(outlier_ratio=0.0, dropped_ratio=0.0)
+    recording = suit_performer.made_up(9, n_frames=1500, disturbance=noise).recording
     return recording.position_xyz_m, recording.rotation_wxyz, recording.is_valid
 
 
@@ -62,8 +62,10 @@ def test_what_cannot_be_judged_stays_as_it_was(quiet):
 
 @pytest.mark.parametrize("frame_rate_hz", [30.0, 60.0])
 def test_at_few_frames_a_second_outliers_are_found_and_little_else(frame_rate_hz):
-    motion = suit.range_of_motion(5, n_frames=1800, frame_rate_hz=frame_rate_hz)
-    made = suit.record(suit.make_body(5), motion, seed=5, disturbance=suit.Disturbance(wobble_m=0.005))
+    motion = suit_performer.range_of_motion(5, n_frames=1800, frame_rate_hz=frame_rate_hz)
+    made = suit_performer.record(
+        suit_performer.make_body(5), motion, seed=5, disturbance=suit_performer.Disturbance(wobble_m=0.005)
+    )
     cleaned = clean(made.recording)
     marked = cleaned.is_filled & made.recording.is_valid
     assert marked[made.is_outlier].mean() > 0.97

@@ -4,7 +4,7 @@ import pytest
 from kernels import rotation
 from kernels.calibration.cleaning import clean
 from kernels.calibration.joints import UNSEEN, closed_form, from_moments, solve_joints, solve_pair
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 C_I, C_J = np.array([0.1, -0.2, 0.05]), np.array([-0.03, 0.12, 0.2])
 
@@ -108,5 +108,5 @@ def test_all_joints_of_a_clean_body(perfect):
 
 def test_wobble_is_told_from_noise(pairs):
     assert max(one.soft_m for one in pairs) < 1e-3
-    shaken = suit.made_up(7, n_frames=3000, disturbance=suit.Disturbance(wobble_m=0.01))
+    shaken = suit_performer.made_up(7, n_frames=3000, disturbance=suit_performer.Disturbance(wobble_m=0.01))
     assert min(one.soft_m for one in solve_joints(clean(shaken.recording))) > 1e-3

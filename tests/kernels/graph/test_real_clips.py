@@ -5,13 +5,13 @@ import pytest
 
 from assets.formats import bvh
 from kernels import rotation
+from kernels.graph.beat_features import beat_features, concatenate_beats
 from kernels.graph.distance import paired_distance, pose_distance
-from kernels.graph.features import beat_features, concatenate_beats
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.path import find_path
 from kernels.graph.prune import keep_endless, keep_strongest
 from kernels.graph.transitions import find_transitions
-from kernels.motion.beats import motion_beats
+from kernels.motion.motion_beats import motion_beats
 from kernels.skeleton.retarget import retarget
 
 

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from kernels.graph.features import BeatFeatures, concatenate_beats
+from kernels.graph.beat_features import BeatFeatures, concatenate_beats
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.shortlist import SPARE, make_shortlist, nearest_of, update_shortlist
 from kernels.graph.transitions import connect, nearest

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from kernels.graph.costs import PathCosts, hurry_cost
+from kernels.graph.moment_candidates import Proposals
 from kernels.graph.path import STEPS, InfeasiblePathError, find_path
-from kernels.graph.pins import Pin, admitted
+from kernels.graph.pin_conflicts import Pin, admitted
 from kernels.graph.program import PathProgram
-from kernels.graph.proposals import Proposals
 
 
 def random_case(seed, make_random_graph):

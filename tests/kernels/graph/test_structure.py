@@ -5,7 +5,7 @@ import pytest
 
 from kernels.graph.costs import PathCosts
 from kernels.graph.path import find_path
-from kernels.graph.pins import Pin, Reach, admitted
+from kernels.graph.pin_conflicts import Pin, Reach, admitted
 from kernels.graph.structure import FREE_BEATS, node_of_interval, structure_pins
 from kernels.music.repeats import Repeat
 

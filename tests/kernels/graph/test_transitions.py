@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from kernels.graph import transitions
+from kernels.graph.beat_features import BeatFeatures
 from kernels.graph.costs import PathCosts
 from kernels.graph.distance import PoseFeatures, pose_distance
-from kernels.graph.features import BeatFeatures
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.transitions import (
     LOCAL_BOUNDS,

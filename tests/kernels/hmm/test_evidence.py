@@ -7,7 +7,7 @@ import pytest
 
 from kernels.hmm.evidence import Evidence, measure, predicted, shuffled_order
 from kernels.hmm.model import Performed, Smoothing, choose_smoothing
-from kernels.synthetic.performance import DRUM_KEYS, draw_notes, draw_states, hidden_rules
+from kernels.synthetic.hidden_rules import DRUM_KEYS, draw_notes, draw_states, hidden_rules
 
 
 def performance(loyalty, n=600, seed=0):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels.matching.pieces import ease_pace, longest_first, motion_under, other_starts, snap_start, split_span
-from kernels.motion.features import bumps
+from kernels.motion.motion_features import bumps
 
 SEGMENT = bumps(240, np.array([0.0, 60, 120, 180]), np.ones(4), width_s=0.05)
 

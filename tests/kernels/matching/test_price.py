@@ -5,7 +5,7 @@ import pytest
 
 from kernels.matching import intensity
 from kernels.matching.price import ClipFeatures, Place, SongSpan, agreement, lay_piece, match_cost
-from kernels.motion.features import bumps
+from kernels.motion.motion_features import bumps
 
 STEPS = bumps(600, 60.0 * np.arange(10), np.ones(10), width_s=0.05).astype(np.float32)
 RISING = np.linspace(0.0, 1.0, 600)

@@ -19,7 +19,7 @@ from kernels.motion.key_poses import (
 )
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import JOINTS
-from kernels.synthetic.performance import hidden_rules, perform
+from kernels.synthetic.hidden_rules import hidden_rules, perform
 
 
 def performed(rate_hz=30.0, interval_s=0.5, n=40, seed=2):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels.music.attacks import STIFFNESS, _smooth, attack_strength, snap_to_attacks
-from kernels.synthetic.music import CLICKS, beat_times, click_train
+from kernels.synthetic.drum_machine import CLICKS, beat_times, click_train
 
 
 @pytest.mark.parametrize("click", CLICKS)

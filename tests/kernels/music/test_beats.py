@@ -8,7 +8,7 @@ import pytest
 
 from assets.formats import audio, beats_file
 from kernels.music.beats import TRACKERS, track_beats
-from kernels.synthetic.music import CLICKS, beat_times, click_train, drum_machine_song
+from kernels.synthetic.drum_machine import CLICKS, beat_times, click_train, drum_machine_song
 
 RATE = 22050
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels.music.floor import librosa_beats
-from kernels.synthetic.music import beat_times, click_train
+from kernels.synthetic.drum_machine import beat_times, click_train
 
 
 @pytest.mark.slow

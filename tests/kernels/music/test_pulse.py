@@ -8,7 +8,7 @@ from kernels.music.harmony import harmony_changes, key_levels
 from kernels.music.onsets import band_levels
 from kernels.music.pulse import PULSE_RATE_HZ, layer_shapes, pulse_features, pulse_probability
 from kernels.music.pulse_weights import N_HIDDEN
-from kernels.synthetic.music import drum_machine_song
+from kernels.synthetic.drum_machine import drum_machine_song
 
 RATE = 22050
 

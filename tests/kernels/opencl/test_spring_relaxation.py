@@ -11,7 +11,7 @@ from kernels.calibration.springs import relax_springs
 from kernels.calibration.tree_solver import BodyModel, Stream, make_model
 from kernels.opencl.device import list_devices
 from kernels.opencl.spring_relaxation import SpringRelaxation
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 DEVICES = list_devices()
 
@@ -33,7 +33,7 @@ def precision(request, context):
 @pytest.fixture(scope="module", params=[0.0, 1000.0], ids=["near", "far"])
 def problem(request):
     """A true body, and noisy sensors with gaps and outliers filled, about an origin near or far."""
-    made = suit.made_up(5, n_frames=200)
+    made = suit_performer.made_up(5, n_frames=200)
     model = make_model(made.body.in_parent_sensor_m, made.body.in_child_sensor_m)
     stream = to_stream(clean(made.recording))
     return model, replace(stream, position_xyz_m=stream.position_xyz_m + request.param * np.array([1.0, -2.0, 0.5]))

@@ -11,7 +11,7 @@ from kernels.calibration.records import PARENT
 from kernels.calibration.tree_solver import BodyModel, Stream, make_model, solve_tree
 from kernels.opencl.device import list_devices
 from kernels.opencl.tree_gauss_newton import TreeGaussNewton
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 
 DEVICES = list_devices()
 
@@ -33,7 +33,7 @@ def solver(request, context):
 @pytest.fixture(scope="module", params=[0.0, 1000.0], ids=["near", "far"])
 def problem(request):
     """A true body, and noisy sensors with gaps and outliers filled and hardly believed, about an origin near or far."""
-    made = suit.made_up(5, n_frames=300)
+    made = suit_performer.made_up(5, n_frames=300)
     model = make_model(made.body.in_parent_sensor_m, made.body.in_child_sensor_m)
     stream = to_stream(clean(made.recording))
     assert 0 < np.mean(stream.weight < 1) < 0.1

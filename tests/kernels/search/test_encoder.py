@@ -7,7 +7,7 @@ from kernels import rotation
 from kernels.search import network
 from kernels.search.discriminant import discriminant, principal
 from kernels.search.encoder import N_EMBEDDING, Encoder, from_arrays
-from kernels.search.fit import LABELLED, statistics_of
+from kernels.search.encoder_fit import LABELLED, statistics_of
 
 
 @pytest.fixture(scope="module")

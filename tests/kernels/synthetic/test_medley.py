@@ -8,7 +8,7 @@ from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.synthetic.dancer import take
 from kernels.synthetic.medley import medley, sway, wear
-from kernels.synthetic.suit import CLEAN, SENSORS, make_body, record
+from kernels.synthetic.suit_performer import CLEAN, SENSORS, make_body, record
 
 MOVES = ("step", "spin", "wave", "kick")
 

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from kernels.synthetic import suit
+from kernels.synthetic import suit_performer
 from kernels.synthetic.suit_faults import FAULTS
 
 
 @pytest.fixture(scope="module")
 def recording():
-    return suit.made_up(1, n_frames=1500).recording
+    return suit_performer.made_up(1, n_frames=1500).recording
 
 
 @pytest.mark.parametrize("name", FAULTS)

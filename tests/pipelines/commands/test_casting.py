@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from assets.formats import usd_check, usd_read
-from pipelines.commands.build import build_studio
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.build_studio import build_studio
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.commands.why import explain_dance
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError

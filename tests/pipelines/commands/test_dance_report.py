@@ -5,7 +5,7 @@ import json
 import pytest
 
 from pipelines.commands import dance_report
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError
 from pipelines.studio.folder import StudioFolder

@@ -6,7 +6,7 @@ import pytest
 from assets.formats import bvh, midi
 from pipelines.commands import demo_studio
 from pipelines.commands.check import check_stage
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError
 

@@ -4,8 +4,8 @@ import pytest
 
 from kernels.opencl.device import list_devices
 from pipelines.commands import device_report
-from pipelines.commands.status import status
-from pipelines.devices import REFERENCE
+from pipelines.commands.status import studio_status
+from pipelines.device_fallback import REFERENCE
 
 pytestmark = pytest.mark.opencl
 
@@ -30,7 +30,9 @@ def test_every_device_is_told_with_its_trial_and_exactly_one_computes(tmp_path):
 def test_a_device_that_fails_its_trial_stands_there_with_its_reason(tmp_path, monkeypatch):
     if not list_devices():
         pytest.skip("no OpenCL device here")
-    monkeypatch.setattr("pipelines.devices.try_alone", lambda index, device: "error: unknown target CPU 'generic'")
+    monkeypatch.setattr(
+        "pipelines.device_fallback.try_alone", lambda index, device: "error: unknown target CPU 'generic'"
+    )
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     outcome = device_report.report(tmp_path)
     assert [d["reason"] for d in outcome.facts["devices"][:-1]] == ["error: unknown target CPU 'generic'"] * len(
@@ -54,9 +56,9 @@ def test_the_studios_setting_counts(tmp_path):
 
 
 def test_status_tells_devices_beside_the_studio_or_alone(built, tmp_path):
-    both = status(built, devices=True)
+    both = studio_status(built, devices=True)
     assert {"clips", "songs", "assets", "devices"} <= both.facts.keys()
     assert "clips: 5 read" in both.report
     assert "computes" in both.report
-    assert "devices" not in status(built).facts
-    assert set(status(tmp_path / "none", devices=True).facts) == {"devices"}
+    assert "devices" not in studio_status(built).facts
+    assert set(studio_status(tmp_path / "none", devices=True).facts) == {"devices"}

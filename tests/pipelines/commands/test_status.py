@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 
-from pipelines.commands.status import status
+from pipelines.commands.status import studio_status
 
 
 def test_status_says_every_file_and_asset(built):
@@ -25,14 +25,14 @@ def test_status_says_every_file_and_asset(built):
 
 
 def test_status_before_the_first_build(fresh_studio):
-    found = status(fresh_studio)
+    found = studio_status(fresh_studio)
     assert {c["state"] for c in found.facts["clips"]} == {"new"}
     assert "missing" in found.report
 
 
 def test_status_after_a_change(studio):
     (studio / "clips" / "ayame" / "step.bvh").write_bytes((studio / "clips" / "ayame" / "wave.bvh").read_bytes())
-    found = status(studio)
+    found = studio_status(studio)
     assert {c["state"] for c in found.facts["clips"] if "step" in c["path"]} == {"changed"}
     assert "stale: clip[ayame]: sources changed" in found.report
 
@@ -41,7 +41,7 @@ def test_partitions_stale_for_one_reason_are_one_line(studio):
     for folder in (studio / "clips").iterdir():
         if folder.is_dir():
             (folder / "more.bvh").write_bytes((studio / "clips" / "ayame" / "wave.bvh").read_bytes())
-    unfresh = [line for line in status(studio).report.splitlines() if "stale: clip[" in line]
+    unfresh = [line for line in studio_status(studio).report.splitlines() if "stale: clip[" in line]
     n_sessions = sum(folder.is_dir() for folder in (studio / "clips").iterdir())
     assert n_sessions > 1
     assert len(unfresh) == 1

@@ -6,7 +6,7 @@ import shutil
 import polars as pl
 import pytest
 
-from pipelines.commands.dance import dance_songs
+from pipelines.commands.dance_songs import dance_songs
 from pipelines.commands.why import explain_dance
 from pipelines.resources import NoProgress
 from pipelines.studio.files import StudioError

@@ -9,7 +9,7 @@ from upath import UPath
 from assets.stamps import ClipStamp, Stamp
 from assets.tables import pack
 from assets.tables.motion import from_motion_beat
-from kernels.motion.beats import motion_beats
+from kernels.motion.motion_beats import motion_beats
 from kernels.synthetic.dancer import place, take
 from pipelines.studio.files import LakeError, why, write_beside
 from pipelines.studio.lake import Lake
