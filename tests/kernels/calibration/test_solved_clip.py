@@ -36,6 +36,16 @@ def test_at_rest_the_body_stands_upright_facing_z(poses, made):
     assert rest[at["l_foot_end"], 2] > rest[at["l_foot"], 2] + 0.1
 
 
+def test_ends_that_no_sensor_shows_lie_where_an_average_body_has_them(poses):
+    skeleton = to_clip(poses, 120.0).skeleton
+    offset = dict(zip(skeleton.joints, skeleton.offset_xyz_m, strict=True))
+    for side in ("l_", "r_"):
+        leg_m = np.linalg.norm(offset[side + "shank"]) + np.linalg.norm(offset[side + "foot"])
+        np.testing.assert_allclose(offset[side + "foot_end"], np.array([0, -0.06, 0.15]) / 0.82 * leg_m)
+        np.testing.assert_allclose(offset[side + "hand_end"], 0.7 * offset[side + "hand"])
+    np.testing.assert_allclose(offset["head_end"], [0, np.linalg.norm(offset["head"]) / 2, 0])
+
+
 @pytest.mark.parametrize("turn", [[1.0, 0, 0, 0], [0.5, 0.5, 0.5, 0.5], [0.0, 1.0, 0, 0]])
 def test_any_world_is_stood_up(poses, turn):
     turned = replace(

@@ -67,3 +67,18 @@ def test_no_frame_and_wrong_shapes():
     assert orientation.shape == (0, 3, 4)
     with pytest.raises(ValueError, match=r"want \(F, 3\) and \(F, 3, 4\)"):
         kinematics.forward(CHAIN, np.zeros((2, 3)), np.zeros((2, 4, 4)))
+
+
+def test_some_joints_are_where_all_would_be_with_those_above_them(some):
+    root, local = some
+    position, orientation = kinematics.forward(CANONICAL, root, local)
+    knee = CANONICAL.joints.index("leftLowerLeg")
+    few_position, few_orientation = kinematics.forward_some(CANONICAL, root, local, [knee])
+    assert few_position.shape == (7, 22, 3)
+    assert few_orientation.shape == (7, 22, 4)
+    needed = [0, CANONICAL.joints.index("leftUpperLeg"), knee]
+    np.testing.assert_allclose(few_position[:, needed], position[:, needed], atol=1e-12)
+    np.testing.assert_allclose(few_orientation[:, needed], orientation[:, needed], atol=1e-12)
+    others = np.setdiff1d(np.arange(22), needed)
+    assert not few_position[:, others].any()
+    assert not few_orientation[:, others].any()
