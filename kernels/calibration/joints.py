@@ -151,7 +151,9 @@ def closed_form(
     apart = np.matvec(R_i, c_i) - np.matvec(R_j, c_j) - d
     residual = np.sqrt(np.sum(apart * apart, axis=-1))
     used = weight > 0
-    sigma = float(np.median(residual[used])) / NORM_3D if used.any() else float("inf")
+    if not used.any():  # no frame says anything of any direction
+        return PairSolution(c_i, c_j, np.zeros(3), U, V, 0, residual, float("inf"), weight)
+    sigma = float(np.median(residual[used])) / NORM_3D
     return PairSolution(c_i, c_j, spread, U, V, int(rank), residual, sigma, weight)
 
 

@@ -105,3 +105,11 @@ def test_with_fewer_than_three_sensors_nothing_is_compared():
     mended, found = turned_back(position, is_usable)
     np.testing.assert_array_equal(mended, position)
     assert found == []
+
+
+def test_a_jump_that_noise_makes_shorter_for_one_step_is_still_one():
+    place = np.tile([0.11, 0.0, 0.0], (60, 1))
+    place[30:] *= -1
+    place[[29, 30], 0] = [0.07, -0.07]
+    mended, _ = turned_back(around(place))
+    assert (mended[:, 3] != place).any(axis=1).sum() == 30

@@ -95,3 +95,35 @@ def test_no_frame_is_refused():
     none = BodyPoses(SENSORS, np.zeros((0, 17, 3)), np.zeros((0, 17, 4)), np.zeros((0, 16)), np.zeros((0, 16)))
     with pytest.raises(ValueError, match="at least one frame"):
         find_gauge(none, 120.0)
+
+
+def test_ends_no_sensor_shows_are_in_proportion_to_the_bones_before_them(poses):
+    clip = to_clip(poses, 120.0)
+    at = {name: k for k, name in enumerate(clip.skeleton.joints)}
+    offset = clip.skeleton.offset_xyz_m
+    size = {name: np.linalg.norm(offset[k]) for name, k in at.items()}
+    for side in ("l_", "r_"):
+        leg_m = size[side + "shank"] + size[side + "foot"]
+        np.testing.assert_allclose(offset[at[side + "foot_end"]], np.array([0, -0.06, 0.15]) * leg_m / 0.82)
+        np.testing.assert_allclose(offset[at[side + "hand_end"]], 0.7 * offset[at[side + "hand"]])
+    np.testing.assert_allclose(offset[at["head_end"]], [0, 0.5 * size["head"], 0])
+
+
+def test_of_half_seconds_as_still_and_straight_the_first_is_the_rest_pose(poses):
+    held = replace(
+        poses,
+        position_xyz_m=np.repeat(poses.position_xyz_m[:1], 200, axis=0),
+        rotation_wxyz=np.repeat(poses.rotation_wxyz[:1], 200, axis=0),
+    )
+    gauge = find_gauge(held, 120.0)
+    assert (gauge.first_frame, gauge.end_frame) == (0, 60)
+    short = replace(held, position_xyz_m=held.position_xyz_m[:7], rotation_wxyz=held.rotation_wxyz[:7])
+    assert (find_gauge(short, 120.0).first_frame, find_gauge(short, 120.0).end_frame) == (0, 7)
+
+
+def test_a_body_that_moves_is_not_at_rest(poses):
+    still = np.repeat(poses.position_xyz_m[:1], 200, axis=0)
+    still[:100, :, 0] += 0.01 * np.arange(100)[:, None]  # walks at first, upright as after it
+    still[100:, :, 0] += 0.99
+    moved = replace(poses, position_xyz_m=still, rotation_wxyz=np.repeat(poses.rotation_wxyz[:1], 200, axis=0))
+    assert find_gauge(moved, 120.0).first_frame >= 99

@@ -171,3 +171,61 @@ def test_errors(broken, rate_hz):
     position[3, 2, 1] += broken
     with pytest.raises(ValueError, match=r"position_m|frame_rate_hz"):
         features(position, root, rate_hz)
+
+
+def test_four_frames_and_more_are_resampled_by_curves_and_fewer_by_lines():
+    t = np.arange(31) / 30
+    fine = at_feature_rate(np.sin(2 * np.pi * 2 * t), 30.0)
+    np.testing.assert_allclose(fine[20:-20], np.sin(2 * np.pi * 2 * np.arange(121) / 120)[20:-20], atol=2e-3)
+    bent = np.array([0.0, 1.0, 0.0])
+    np.testing.assert_allclose(at_feature_rate(bent, 60.0), [0, 0.5, 1, 0.5, 0])
+    assert at_feature_rate(np.append(bent, 1.0), 60.0)[1] != 0.5
+    same = np.random.default_rng(0).normal(size=9)
+    np.testing.assert_array_equal(at_feature_rate(same, 120.0), same)
+
+
+def test_the_number_of_values_does_not_hang_on_rounding():
+    for rate_hz, n in ((29.97, 300), (24.0, 25), (59.94, 61), (100.0, 6)):
+        assert len(at_feature_rate(np.zeros(n), rate_hz)) == int((n - 1) * 120 / rate_hz + 1e-6) + 1
+
+
+def test_a_drop_is_from_the_lower_of_the_two_highest_points_beside_it():
+    effort = np.interp(np.arange(61), [0, 10, 20, 40, 60], [0.5, 3.0, 1.0, 8.0, 0.0])
+    frame, drop = stops(effort)
+    assert (frame.tolist(), drop.tolist()) == ([20], [2.0])
+
+
+@pytest.mark.parametrize(("high", "low", "n"), [(2.0, 1.75, 1), (2.0, 1.85, 0), (10.0, 9.1, 1), (10.0, 9.3, 0)])
+def test_a_stop_loses_a_fifth_of_a_radian_a_second_and_eight_hundredths_of_what_the_clip_moves_with(high, low, n):
+    effort = np.interp(np.arange(201), [0, 100, 200], [high, low, high])
+    assert len(stops(effort)[0]) == n
+
+
+def test_a_bump_of_a_moment_between_frames_stands_between_them_and_ends_at_three_deviations():
+    out = bumps(61, np.array([30.4]), np.ones(1), width_s=0.05)  # six frames
+    np.testing.assert_allclose(out[[30, 31]], np.exp(-0.5 * (np.array([-0.4, 0.6]) / 6) ** 2))
+    np.testing.assert_array_equal(np.flatnonzero(out), np.arange(13, 49))
+
+
+def test_clips_of_two_frames_have_no_stop_and_of_one_no_effort():
+    assert len(stops(np.array([3.0, 1.0]))[0]) == 0
+    assert weight_effort(np.ones((1, 2, 3)), np.ones(2)).tolist() == [0.0]
+    assert weight_effort(np.zeros((0, 2, 3)), np.ones(2)).tolist() == []
+
+
+def test_effort_at_the_ends_is_that_of_the_step_there():
+    angle = np.array([0.0, 0.01, 0.03, 0.06])
+    direction = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)[:, None]
+    np.testing.assert_allclose(weight_effort(direction, np.ones(1), rate_hz=1.0), [0.01, 0.015, 0.025, 0.03])
+
+
+def test_a_body_that_turns_whole_rounds_on_the_spot_makes_no_effort():
+    n = 241
+    position, _ = swinging(n, 60.0, size_rad=0.0)
+    heading = np.linspace(0, 6 * np.pi, n)
+    turn = rotation.from_heading(heading)
+    spun = rotation.apply(turn[:, None], position)
+    found = features(spun, turn, 60.0)
+    assert found.effort_rad_per_s.max() < 0.02
+    assert not found.rhythm.any()
+    assert (found.peak_effort_rad_per_s == found.effort_rad_per_s).all()  # of what stands still, as measured
