@@ -23,6 +23,13 @@ def test_cover_fills_a_break_evenly():
     assert (~is_beat).sum() == 4
 
 
+def test_a_passage_of_slower_beats_is_no_break():
+    beats = np.concatenate([[0.0], np.cumsum([0.5] * 20 + [0.9] * 20)])
+    grid, is_beat = cover(beats, beats[-1])
+    np.testing.assert_allclose(grid, beats)
+    assert is_beat.all()
+
+
 def test_cover_follows_a_ramp():
     beats = np.cumsum(np.linspace(0.6, 0.4, 30))
     grid, _ = cover(beats, beats[-1] + 1.0)

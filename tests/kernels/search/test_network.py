@@ -46,3 +46,23 @@ def test_weights_have_their_shapes_and_their_seed(weights):
     assert {k: v.shape for k, v in weights.items()} == network.weight_shapes()
     again = network.initial_weights(np.random.default_rng(0))
     assert all(np.array_equal(weights[k], again[k]) for k in weights)
+
+
+@pytest.mark.parametrize("n_frames", [4, 5, 11])
+def test_frames_are_pooled_two_by_two_and_a_lone_last_one_by_itself(weights, rng, n_frames):
+    """Frame by frame, as the network's description says it."""
+    frames = rng.normal(size=(n_frames, N_CHANNELS)).astype(np.float32)
+    value = list(frames)
+    for i, (k, is_pooled) in enumerate(zip(network.KERNELS, network.POOLED, strict=True)):
+        none = np.zeros_like(value[0])
+        padded = [none] * (k // 2) + value + [none] * (k // 2)
+        value = [
+            np.concatenate(padded[t : t + k]) @ weights[f"matrix_{i}"] + weights[f"bias_{i}"] for t in range(len(value))
+        ]
+        value = [(v - v.mean()) / np.sqrt(v.var() + 1e-5) for v in value]
+        value = [np.maximum(v * weights[f"gain_{i}"] + weights[f"shift_{i}"], 0) for v in value]
+        if is_pooled:
+            value = [np.mean(value[t : t + 2], axis=0) for t in range(0, len(value), 2)]
+    out = np.concatenate([np.mean(value, axis=0), np.max(value, axis=0)]) @ weights["head"]
+    got = network.forward(weights, *network.batch([frames]))[0]
+    np.testing.assert_allclose(got, out / np.linalg.norm(out), atol=1e-5)
