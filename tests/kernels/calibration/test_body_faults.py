@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.calibration.body_faults import find_body_faults, move_to_repeat
+from kernels.calibration.body_faults import _loose, _movement, find_body_faults, move_to_repeat
 from kernels.calibration.cleaning import clean
-from kernels.calibration.joints import solve_joints
-from kernels.calibration.records import SENSORS
+from kernels.calibration.joints import PairSolution, solve_joints
+from kernels.calibration.records import JOINTS, SENSORS
 from kernels.synthetic import suit_performer
 
 
@@ -93,3 +93,46 @@ def test_few_good_frames_of_a_joint_are_told(cleaned, pairs, n_frames, severity,
     assert [(one.severity, want in one.sentence, f"got {n_frames}" in one.sentence) for one in found] == [
         (severity, True, True)
     ]
+
+
+def moved(rank=3, n_good=2000, sigma_m=0.002, degrees=(40.0, 30.0, 20.0)):
+    """A joint as solved: how many of its frames are good, and how far it was turned about each direction."""
+    weight = (np.arange(2000) < n_good).astype(float)
+    spread = np.radians(degrees) ** 2 / 2
+    return PairSolution(np.zeros(3), np.zeros(3), spread, np.eye(3), np.eye(3), rank, np.zeros(2000), sigma_m, weight)
+
+
+def told(judge, **changed):
+    """Severity and sentence for a joint, the others being in order."""
+    at = JOINTS.index("l_hand")
+    pairs = [moved(**changed) if k == at else moved() for k in range(len(JOINTS))]
+    return [(one.severity, one.sensor, one.sentence) for one in judge(pairs)]
+
+
+@pytest.mark.parametrize(
+    ("changed", "severity", "words"),
+    [
+        ({"n_good": 239}, "error", "want at least 240 frames with its two sensors good, got 239"),
+        ({"n_good": 239, "rank": 1}, "error", "want at least 240 frames"),
+        ({"rank": 1}, "error", "want it moved about at least two axes, got 30.0 degrees about the second"),
+        ({"rank": 2, "n_good": 300}, "warning", "got 20.0 degrees about the weakest"),
+        ({"n_good": 240}, "warning", "want 960 frames or more with its two sensors good, got 240"),
+        ({"n_good": 959}, "warning", "lengths will be rough"),
+    ],
+)
+def test_too_little_movement_and_too_few_frames_are_told_the_worst_alone(changed, severity, words):
+    ((found, sensor, sentence),) = told(_movement, **changed)
+    assert (found, sensor) == (severity, "l_hand")
+    assert words in sentence
+
+
+def test_enough_movement_in_enough_frames_is_not_told():
+    assert told(_movement, n_good=960) == []
+
+
+@pytest.mark.parametrize(
+    ("sigma_m", "severity"), [(0.030, None), (0.031, "warning"), (0.060, "warning"), (0.061, "error")]
+)
+def test_a_loose_sensor_is_doubtful_and_a_strange_one_wrong(sigma_m, severity):
+    assert [found for found, _, _ in told(_loose, sigma_m=sigma_m)] == ([] if severity is None else [severity])
+    assert told(_loose, sigma_m=np.inf, n_good=0) == []  # where no frame is good nothing is known of it

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.calibration.timeline import collapse, onto_grid, timeline
+from kernels.calibration.timeline import Timeline, collapse, onto_grid, timeline
 
 
 def bursts(n, rate_hz, *, every=50, held=20):
@@ -145,3 +145,46 @@ def test_nothing_said_again_is_no_news():
 def test_times_in_a_finer_unit_are_named(scale, unit):
     with pytest.raises(ValueError, match=unit):
         timeline(np.arange(100) / 120 * scale)
+
+
+def test_a_grid_ends_with_the_last_sample_that_has_a_place():
+    rng = np.random.default_rng(0)
+    time_s = np.append(0.0, np.cumsum(rng.uniform(0.6, 1.4, 120))) / 60
+    line = timeline(time_s)
+    assert line.kind == "uneven"
+    assert (line.n_places - 1) / line.rate_hz <= time_s[-1] < line.n_places / line.rate_hz
+
+
+@pytest.mark.parametrize(("off", "common"), [(0.004, True), (0.006, False)])
+def test_an_even_rate_within_half_a_hundredth_of_a_common_one_is_that(off, common):
+    rate_hz = timeline(np.arange(400) / (60.0 * (1 - off))).rate_hz
+    assert (rate_hz == 60.0) == common
+    assert rate_hz == pytest.approx(60.0, rel=0.007)
+
+
+@pytest.mark.parametrize(("pause_s", "refused"), [(4.9, False), (5.1, True)])
+def test_a_pause_of_more_than_five_seconds_ends_a_take(pause_s, refused):
+    time_s = np.append(np.arange(200) / 50, 199 / 50 + pause_s + np.arange(200) / 50)
+    if refused:
+        with pytest.raises(ValueError, match=r"got a pause of 5\.1 s after 4\.0 s; cut the recording there"):
+            timeline(time_s)
+    else:
+        assert timeline(time_s).n_lost == pytest.approx(4.9 * 50 - 1, abs=1)
+
+
+def test_samples_are_interpolated_between_neighbours_near_enough():
+    time_s = np.array([0.0, 0.13, 0.2, 0.31, 0.4, 0.71, 0.8, 0.9, 1.0])
+    line = Timeline(10.0, "uneven", np.rint(10 * time_s).astype(int), 11)
+    position = time_s[:, None, None] * np.ones((1, 1, 3))
+    turned = np.tile(rotation.IDENTITY, (9, 1, 1))
+    place, _, valid = onto_grid(line, time_s, position, turned, np.ones((9, 1), bool))
+    assert valid[:, 0].tolist() == [True] * 5 + [False] * 2 + [False, True, True, True]
+    np.testing.assert_allclose(place[valid[:, 0], 0, 0], np.arange(11)[valid[:, 0]] / 10)
+
+
+def test_a_sensor_heard_once_is_not_on_an_uneven_grid():
+    time_s = np.array([0.0, 0.13, 0.2, 0.31])
+    line = Timeline(10.0, "uneven", np.array([0, 1, 2, 3]), 4)
+    is_valid = np.array([[True], [False], [False], [False]])
+    turned = np.tile(rotation.IDENTITY, (4, 1, 1))
+    assert not onto_grid(line, time_s, np.zeros((4, 1, 3)), turned, is_valid)[2].any()

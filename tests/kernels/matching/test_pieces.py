@@ -114,3 +114,20 @@ def test_a_slow_match_comes_nearer_to_its_own_pace_where_that_costs_little():
     assert ease_pace(lonely, moving, numerator=50, start_frame_index=60, loss_ratio=1.0) == (50, 60)
     assert ease_pace(lonely, moving[:280], numerator=45, start_frame_index=60, loss_ratio=1.0)[0] == 46
     assert ease_pace(lonely, moving[:20], numerator=45, start_frame_index=0, loss_ratio=1.0) == (45, 0)
+
+
+@pytest.mark.parametrize(("beat", "start"), [(74, 74), (75, 60), (46, 46), (45, 60)])
+def test_a_start_is_moved_by_no_more_than_120_ms(beat, start):
+    assert snap(clip(60), 60, [beat / 120], 1.0) == start
+
+
+def test_of_two_beats_the_nearer_is_taken_and_a_start_may_end_with_its_clip():
+    assert snap(clip(60), 60, [53 / 120, 64 / 120], 1.0) == 64
+    whole = clip(60)[: 64 + 240]
+    assert snap(whole, 60, [64 / 120], 1.0) == 64
+    assert snap(whole[:-1], 60, [64 / 120], 1.0) == 60
+
+
+def test_beats_just_inside_a_span_do_not_cut_it():
+    edges = split_span(0.0, 4.0, beat_s=np.array([0.05, 2.0, 3.95]), longest_s=2.5)
+    np.testing.assert_allclose(edges, [0, 2, 4])

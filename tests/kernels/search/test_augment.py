@@ -43,3 +43,19 @@ def test_one_frame_stays_one_frame(dance, rng):
 def test_the_seed_says_it_all(dance):
     a, b = (vary(dance, np.random.default_rng(3), Augmentation(), longest=64) for _ in range(2))
     np.testing.assert_array_equal(a, b)
+
+
+def test_joints_are_off_as_far_as_said_and_a_third_of_that_differs_frame_by_frame():
+    still = np.zeros((64, 22, 3))
+    how = Augmentation(stretch_ratio=1.0, least_part_ratio=1.0, joint_noise_m=0.03)
+    varied = np.stack([vary(still, np.random.default_rng(seed), how, longest=64) for seed in range(20)])
+    same = varied.mean(axis=1)
+    assert same.std() == pytest.approx(0.03, rel=0.05)
+    assert (varied - same[:, None]).std() == pytest.approx(0.01, rel=0.03)
+
+
+def test_a_short_motion_is_not_cut_below_half_a_second():
+    motion = np.arange(10.0)[:, None, None] * np.ones((1, 22, 3))
+    how = Augmentation(stretch_ratio=1.0, least_part_ratio=0.1, joint_noise_m=0.0)
+    n = {len(vary(motion, np.random.default_rng(seed), how, longest=64)) for seed in range(60)}
+    assert n == {7, 8, 9, 10}  # of 15 frames a second

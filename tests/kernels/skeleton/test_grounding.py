@@ -121,3 +121,53 @@ def test_few_frames(step, n):
     assert np.abs(shift).max() < 1e-6
     turned = grounding.plant_legs(position, orientation, contacts=contacts, frame_rate_hz=RATE, **feet(position))
     assert rotation.angle_between(turned, orientation).max() < 1e-4
+
+
+def crouched(knee_rad=0.8):
+    """World positions and orientations of one frame with bent knees, feet level."""
+    local = np.tile(rotation.IDENTITY, (1, 22, 1))
+    for side in ("left", "right"):
+        for part, angle in (("UpperLeg", -knee_rad / 2), ("LowerLeg", knee_rad), ("Foot", -knee_rad / 2)):
+            local[:, JOINTS.index(side + part)] = rotation.from_axis_angle(np.array([1.0, 0, 0]), angle)
+    return kinematics.forward(CANONICAL, np.array([[0.0, 0.9, 0.0]]), local)
+
+
+@pytest.mark.parametrize("shift", [(0.0, 0.05, 0.0), (0.0, -0.02, 0.0), (0.04, 0.0, 0.0), (0.0, 0.0, -0.06)])
+def test_ankles_move_as_far_as_they_are_asked_to_and_feet_keep_their_turn(shift):
+    position, orientation = crouched()
+    both = np.array([[shift, np.zeros(3)]])
+    bent = grounding.bend_legs(position, orientation, both, limit_rad=1.0)
+    moved = kinematics.hang(CANONICAL, position[:, 0], bent)
+    np.testing.assert_allclose(moved[:, ANKLES] - position[:, ANKLES], both, atol=1e-9)
+    np.testing.assert_allclose(bent[:, ANKLES], orientation[:, ANKLES])
+
+
+def test_legs_give_way_up_to_the_limit_and_an_ankle_comes_nearer_for_it():
+    position, orientation = crouched()
+    shift = np.array([[[0.0, 0.2, 0.0], [0.0, 0.2, 0.0]]])
+    bent = grounding.bend_legs(position, orientation, shift, limit_rad=0.05)
+    turned = rotation.angle_between(bent, orientation)
+    assert turned.max() == pytest.approx(0.05, rel=0.2)
+    assert turned.max() <= 0.05 + 1e-9
+    risen = kinematics.hang(CANONICAL, position[:, 0], bent)[:, ANKLES, 1] - position[:, ANKLES, 1]
+    assert (risen > 0.005).all()
+
+
+def test_an_ankle_out_of_reach_comes_as_near_as_the_straight_leg_goes():
+    position, orientation = crouched()
+    far = np.array([[[0.0, -0.5, 0.0]] * 2])
+    moved = kinematics.hang(CANONICAL, position[:, 0], grounding.bend_legs(position, orientation, far, limit_rad=9.0))
+    hip, ankle = moved[:, grounding.THIGHS], moved[:, ANKLES]
+    np.testing.assert_allclose(np.linalg.norm(ankle - hip, axis=-1), grounding.LEG_M, atol=1e-6)
+
+
+def test_a_leg_comes_back_to_its_source_within_the_time_to_fade():
+    shift = np.zeros((21, 3))
+    shift[10] = [0.0, 0.04, 0.0]
+    planted = np.arange(21) == 10
+    faded = grounding._fade(shift, planted, 5)[:, 1] / 0.04
+    np.testing.assert_allclose(faded, faded[::-1])
+    assert (faded[[4, 5]] == 0).all()
+    assert faded[10] == 1
+    assert (np.diff(faded[5:11]) > 0).all()
+    assert not grounding._fade(np.zeros((4, 3)), np.zeros(4, bool), 5).any()
