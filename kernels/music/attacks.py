@@ -111,10 +111,11 @@ def snap_to_attacks(beat_s: Float, samples: Samples, sample_rate_hz: float) -> F
     leaves a steady change of tempo free; attacks that stray from the line so found lose
     their pull (iteratively reweighted least squares).
     """
-    n = len(beat_s)
+    given_s = np.asarray(beat_s, np.float64)
+    n = len(given_s)
     if n < 4:
-        return np.asarray(beat_s, np.float64)
-    beat_s = beat_s + _common_lag(beat_s, samples, sample_rate_hz)
+        return given_s
+    beat_s = given_s + _common_lag(given_s, samples, sample_rate_hz)
     strength = attack_strength(samples, sample_rate_hz, beat_s, reach_s=REACH_S)
     offset_s = (np.arange(strength.shape[1]) - strength.shape[1] // 2) * STEP_S
     near = strength * np.exp(-0.5 * (offset_s / TRUST_S) ** 2)
@@ -132,7 +133,7 @@ def snap_to_attacks(beat_s: Float, samples: Samples, sample_rate_hz: float) -> F
     for _ in range(N_ROUNDS):
         weight = pull / (1.0 + ((attack_s - line) / STRAY_S) ** 2) + 1e-3
         line = _smooth(attack_s, weight)
-    return line if (np.diff(line) > 0).all() else np.asarray(beat_s, np.float64)
+    return line if (np.diff(line) > 0).all() else given_s
 
 
 def _common_lag(beat_s: Float, samples: Samples, sample_rate_hz: float) -> float:

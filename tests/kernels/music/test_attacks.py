@@ -63,3 +63,35 @@ def test_banded_solution_is_the_dense_one():
         third = np.diff(np.eye(n), 3, axis=0)
         dense = np.linalg.solve(np.diag(weight) + STIFFNESS * third.T @ third, weight * value)
         np.testing.assert_allclose(_smooth(value, weight), dense, atol=1e-9)
+
+
+@pytest.mark.parametrize("first_s", [0.5, 0.43, 0.57])
+def test_beats_so_close_that_one_attack_draws_them_all_stay_as_they_are(first_s):
+    """Beside the attack, and so far off it that all of them would be moved by one lag first."""
+    train = click_train(np.array([0.5]), sample_rate_hz=22050)
+    beats = first_s + 1e-5 * np.arange(6)
+    np.testing.assert_array_equal(snap_to_attacks(beats, train.samples, 22050), beats)
+
+
+def test_a_tone_that_is_cut_off_is_no_attack():
+    """The click at the end of a beep is as wide in frequency as its start, but leaves less sound."""
+    time_s = np.arange(22050) / 22050
+    beep = np.where((time_s >= 0.3) & (time_s < 0.6), np.sin(2 * np.pi * 1000 * time_s), 0.0)
+    start, end = attack_strength(beep, 22050, np.array([0.3, 0.6]), reach_s=0.03).max(axis=1)
+    assert end < 0.3 * start
+    assert end > 0
+
+
+def test_of_two_attacks_as_strong_the_nearer_draws_a_beat():
+    true = beat_times(tempo_bpm=100, n_beats=12, start_s=0.5)
+    train = click_train(np.sort(np.concatenate([true, true + 0.036])))
+    found = snap_to_attacks(true + 0.006, train.samples, train.sample_rate_hz)
+    assert np.abs(found - true).max() < 0.008
+
+
+def test_attacks_are_looked_for_around_each_beat_alone():
+    train = click_train(np.array([0.5, 1.5]), sample_rate_hz=22050)
+    strength = attack_strength(train.samples, 22050, np.array([1.0, 1.5]), reach_s=0.04)
+    assert strength[0].max() < 1e-3 * strength[1].max()
+    assert attack_strength(train.samples, 22050, np.zeros(0), reach_s=0.04).shape == (0, 41)
+    assert attack_strength(train.samples, 22050, np.array([0.5]), reach_s=0.0).shape == (1, 1)
