@@ -190,6 +190,7 @@ def test_only_feet_that_stand_from_one_end_of_a_blend_to_the_other_can_slip(phra
     rising = made.position_xyz_m + np.linspace(0, 1, len(made.time_s))[:, None, None] * np.array([0.0, 1.0, 0.0])
     np.testing.assert_allclose(seam_slips(replace(made, position_xyz_m=rising), steps, planted), 0, atol=1e-9)
     assert len(seam_slips(made, replace(steps, blend_s=np.zeros(8)), planted)) == 0
+    assert len(seam_slips(made, replace(steps, blend_s=np.where(steps.has_seam, 0.01, 0.0)), planted)) == 0
 
 
 def test_slips_are_judged_by_an_actual_foot_the_worst_of_up_to_twenty(phrases, dance, standing):

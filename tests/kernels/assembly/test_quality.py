@@ -237,3 +237,7 @@ def test_intensity_counts_intervals_inside_the_dance_alone(clips):
     assert values(quality.intensity_measures(made, music, grid_s))["intensity_rank_correlation_ratio"] == pytest.approx(
         1
     )
+    # the last of them ends with the dance, and counts
+    music[4] = 0.0
+    last = values(quality.intensity_measures(made, music, grid_s))["intensity_rank_correlation_ratio"]
+    assert last == pytest.approx(-0.2)

@@ -1,6 +1,7 @@
 """The beat grid over a song, the clock, and the cut to the song's length."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,3 +118,72 @@ def test_blends_never_overlap():
     reach = np.flatnonzero(seam)
     for a, b in itertools.pairwise(reach):
         assert start[a] + width[a] / 2 <= start[b] - width[b] / 2 + 1e-12
+
+
+@pytest.mark.parametrize(("gap_s", "n_filled"), [(0.75, 0), (0.79, 0), (0.81, 1), (1.0, 1), (1.5, 2)])
+def test_only_a_gap_wider_than_the_tempo_allows_is_a_break(gap_s, n_filled):
+    beats = np.concatenate([np.arange(9) * 0.5, 4.0 + gap_s + np.arange(9) * 0.5])
+    grid, is_beat = cover(beats, float(beats[-1]))
+    assert (~is_beat).sum() == n_filled
+    np.testing.assert_allclose(np.diff(grid[(grid > 3.99) & (grid < 4.01 + gap_s)]), gap_s / (n_filled + 1))
+
+
+def test_a_slow_passage_is_no_row_of_breaks():
+    """Local tempo counts: half as fast for nine beats is another tempo, not eight gaps."""
+    beats = np.concatenate([np.arange(12) * 0.5, 6.0 + np.arange(12) * 1.0])
+    grid, is_beat = cover(beats, 17.0)
+    assert (~is_beat[(grid > 8.5) & (grid < 16.5)]).sum() == 0
+
+
+def test_the_grid_reaches_the_very_first_and_last_sample():
+    grid, is_beat = cover(np.array([0.5, 1.0, 1.5]), 2.0)
+    np.testing.assert_allclose(grid, [0.0, 0.5, 1.0, 1.5, 2.0])
+    assert is_beat.tolist() == [False, True, True, True, False]
+    assert grid[0] <= 0
+    assert grid[-1] >= 2.0
+    third = 1 / 3
+    grid, _ = cover(third * np.arange(1, 31), 31 * third)
+    assert -1e-9 < grid[0] <= 0.0
+    assert 31 * third <= grid[-1] < 31 * third + 1e-9
+    before, _ = cover(np.array([-0.2, 0.3, 0.8]), 0.9)
+    np.testing.assert_allclose(before, [-0.2, 0.3, 0.8, 1.3])
+
+
+def test_beats_past_the_end_of_the_song_are_kept():
+    grid, is_beat = cover(np.arange(0, 5.0, 0.5), 3.0)
+    assert is_beat.all()
+    assert grid[-1] == 4.5
+
+
+def test_a_clock_goes_on_evenly_before_its_first_and_after_its_last_boundary(phrases):
+    found = clock(phrases(("a", 0.0, 4, 0.5, 0.4)))
+    np.testing.assert_allclose(found.at(np.array([-1.0, -0.5, 2.0, 3.0])), [-1.25, -0.625, 2.4375 + 0.0625, 3.75])
+
+
+def test_steps_that_only_touch_the_song_are_gone(phrases):
+    steps = phrases(("a", 0.0, 6, 0.5, 0.5))
+    moved = replace(steps, song_start_s=steps.song_start_s - 0.5, song_end_s=steps.song_end_s - 0.5)
+    cut, kept = trim(moved, 1.5)
+    assert kept.tolist() == [1, 2, 3]
+    np.testing.assert_allclose([cut.song_start_s[0], cut.song_end_s[-1]], [0.0, 1.5])
+    np.testing.assert_allclose([cut.clip_start_s[0], cut.clip_end_s[-1]], [0.5, 2.0])
+    none, left = trim(replace(moved, song_start_s=moved.song_start_s + 9, song_end_s=moved.song_end_s + 9), 1.5)
+    assert len(none.clip_id) == len(left) == 0
+
+
+def test_the_last_step_is_cut_in_song_and_clip_at_its_own_pace(phrases):
+    cut, _ = trim(phrases(("a", 0.0, 2, 0.5, 0.4), ("b", 1.0, 1, 0.5, 0.8)), 1.2)
+    assert cut.clip_end_s[-1] == pytest.approx(1.25)
+    assert cut.has_seam.tolist() == [False, False, True]
+    assert cut.blend_s[-1] == pytest.approx(0.3)
+
+
+def test_half_a_blend_may_take_a_whole_step_that_has_one_seam_and_half_of_one_with_two():
+    edges = np.array([0.0, 0.1, 0.2, 2.0])
+    one = blend_widths(edges[:-1], edges[1:], np.array([False, False, True]), wanted_s=0.4)
+    np.testing.assert_allclose(one, [0, 0, 0.2])
+    two = blend_widths(edges[:-1], edges[1:], np.array([False, True, True]), wanted_s=0.4)
+    np.testing.assert_allclose(two, [0, 0.1, 0.1])
+    last = blend_widths(np.array([0.0, 2.0]), np.array([2.0, 2.1]), np.array([False, True]), wanted_s=0.4)
+    np.testing.assert_allclose(last, [0, 0.2])
+    assert blend_widths(edges[:-1], edges[1:], np.array([False, False, True]), wanted_s=0.0).tolist() == [0, 0, 0]

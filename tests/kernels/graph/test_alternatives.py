@@ -3,7 +3,7 @@ import pytest
 
 from kernels.graph.alternatives import find_alternatives, same_ratio, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts
-from kernels.graph.path import find_path
+from kernels.graph.path import Path, find_path
 
 NO_USAGE = PathCosts(usage=0.0)
 
@@ -58,3 +58,39 @@ def test_the_price_rises_until_dances_differ(make_graph):
     assert [int(graph.clip_index[path.source_node[0]]) for path in found] == [0, 1]
     assert same_ratio(*found) == 0
     assert same_ratio(found[0], found[0]) == 1
+
+
+def test_a_price_is_doubled_four_times_at_most(make_graph):
+    """Where the catalogue has one dance alone it is asked for five times, at twice the price each time, and given."""
+    graph = make_graph([np.arange(6) * 0.5])
+    beat_s, asked = np.arange(6) * 0.5, []
+
+    def find(price):
+        asked.append(float(price.max()))
+        return find_path(graph, beat_s, costs=NO_USAGE, stretch_price=price)
+
+    one, other = find_alternatives(graph, 2, find=find, diversity=0.5)
+    assert asked == [0.0, 0.5, 1.0, 2.0, 4.0, 8.0]
+    assert same_ratio(one, other) == 1
+    asked.clear()
+    find_alternatives(graph, 3, find=find, diversity=0.0)
+    assert asked == [0.0, 0.0, 0.0]
+
+
+def test_dances_alike_for_half_of_the_song_are_two():
+    def path(*nodes):
+        n = len(nodes)
+        node, one, no = np.array(nodes), np.ones(n, np.int64), np.zeros(n, bool)
+        zero = np.zeros(n)
+        at = np.arange(n)
+        return Path(node, node + 1, at, one, one, no, zero, zero, zero, zero, zero, zero, zero, zero, zero + 1, no)
+
+    assert same_ratio(path(0, 1, 2, 3), path(0, 1, 7, 8)) == 0.5
+    assert same_ratio(path(0, 1, 2, 3), path(1, 2, 3, 4)) == 0  # the same steps at other beats
+    assert same_ratio(path(), path(1)) == 0
+
+
+def test_every_dance_that_shows_a_stretch_adds_its_price(three_clips):
+    one = dances(three_clips, 1)
+    once, twice = (shown_price(three_clips, one * n, diversity=1.0) for n in (1, 2))
+    np.testing.assert_allclose(twice, 2 * once)

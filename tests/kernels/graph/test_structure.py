@@ -87,3 +87,31 @@ def test_steps_over_two_intervals_have_their_node_in_both(make_graph):
     path = find_path(graph, 0.5 * np.arange(9))
     assert (path.beat_span == 2).all()
     np.testing.assert_array_equal(node_of_interval(path), np.repeat(path.source_node, 2))
+
+
+def test_the_ends_of_a_part_stay_free(joined):
+    graph, reach = joined
+    first = danced(graph, [])
+    pins, _ = structure_pins(first, [CHORUS], reach)
+    inner = [*range(8 + FREE_BEATS, 20 - FREE_BEATS), *range(28 + FREE_BEATS, 40 - FREE_BEATS)]
+    assert sorted(pin.first for pin in pins) == inner
+    assert all(pin.last == pin.first + 1 and pin.nodes.sum() == 1 for pin in pins)
+    short = Repeat(28, 28 + 2 * FREE_BEATS, 8, 0.9)
+    assert structure_pins(first, [short], reach) == ([], 0)
+
+
+def test_a_part_that_goes_on_past_the_song_is_held_as_far_as_it_is_danced(joined):
+    graph, reach = joined
+    pins, n_held = structure_pins(danced(graph, []), [Repeat(28, 46, 8, 0.9)], reach)
+    assert n_held == 1
+    assert max(pin.last for pin in pins) == 40 - FREE_BEATS
+
+
+def test_a_repeat_that_cannot_be_held_leaves_the_others(make_graph):
+    """One clip alone: the first repeat would have to go back, the second asks for nothing new."""
+    graph = make_graph([0.5 * np.arange(60)] * 2, [(39, 60 + 19, 1.0)], both_ways=False)
+    reach = Reach(graph, BEAT_S, costs=PathCosts(), starts=np.arange(60))
+    first = find_path(graph, BEAT_S, starts=np.array([0]))
+    pins, n_held = structure_pins(first, [CHORUS, Repeat(20, 32, 20, 0.9)], reach)
+    assert n_held == 1
+    assert {pin.first for pin in pins} == set(range(22, 30))

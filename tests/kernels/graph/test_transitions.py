@@ -291,3 +291,34 @@ def test_errors(on_a_line):
     pairs = nearest(features, nodes)
     with pytest.raises(ValueError, match="threshold"):
         connect(nodes, pairs, threshold=np.inf)
+
+
+def test_edges_of_one_weight_are_sorted_by_their_targets(on_a_line):
+    features, nodes = on_a_line([np.zeros(4)] * 3)
+    graph = find_transitions(features, nodes).graph
+    assert len(np.unique(graph.weight)) == 1
+    order = np.lexsort((graph.target, graph.source))
+    np.testing.assert_array_equal(order, np.arange(len(graph.source)))
+    assert len(set(zip(graph.source.tolist(), graph.target.tolist(), strict=True))) == len(graph.source)
+
+
+def test_a_recording_as_rough_as_allowed_may_be_a_seam(on_a_line):
+    features, nodes = on_a_line([[0, 1, 0, 1], [0, 1, 0, 1]])
+    free = edges(find_transitions(features, nodes))
+    for roughness, is_joined in ((1.5, True), (1.5001, False)):
+        rough = BeatFeatures(features.pose, features.local_distance, np.where(np.arange(8) == 5, roughness, 0.0))
+        found = edges(find_transitions(rough, nodes))
+        assert (found == free) == is_joined
+
+
+def test_a_blend_with_exactly_the_frames_it_needs_has_room(on_a_line):
+    features, nodes = on_a_line([[0, 1, 0, 1], [0, 1, 0, 1]], lead_s=0.25)
+    assert (2, 4) in edges(find_transitions(features, nodes, min_margin_s=0.25, threshold=3))
+    assert (2, 4) not in edges(find_transitions(features, nodes, min_margin_s=0.2501, threshold=3))
+
+
+def test_nodes_exactly_the_guard_apart_are_two_moments(on_a_line):
+    features, nodes = on_a_line([np.zeros(9)], spacing_s=0.25)
+    joined = edges(find_transitions(features, nodes, guard_s=0.5))
+    assert (4, 2) in joined
+    assert (4, 3) not in joined

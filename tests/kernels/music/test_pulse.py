@@ -121,3 +121,44 @@ def test_speeds_are_averaged_in_log_odds(monkeypatch):
 def test_refuses_other_shapes():
     with pytest.raises(ValueError, match="features"):
         pulse_probability(np.zeros((5, 12)))
+
+
+def test_levels_that_do_not_change_have_no_onset_and_no_change_of_colour():
+    level, centre_hz = np.tile([3.0, 1.0, 2.0], (60, 1)), np.array([60.0, 500.0, 4000.0])
+    found = pulse_features(level, centre_hz, np.zeros((30, 4)))
+    assert found.shape == (30, 16)
+    assert not found[15:-15, :11].any()
+    assert not found[15:-15, 11:].any()
+
+
+def test_a_change_of_colour_is_told_below_and_above_two_hundred_hertz():
+    level, centre_hz = np.zeros((80, 2)), np.array([100.0, 800.0])
+    level[40:, 0] = 2.0  # a low sound sets in and stays
+    found = pulse_features(level, centre_hz, np.zeros((40, 4)))
+    assert abs(int(found[8:-8, 9].argmax()) + 8 - 20) <= 1
+    assert found[8:-8, 9].max() > 0
+    assert not found[8:-8, 10].any()
+    other = pulse_features(level[:, ::-1], centre_hz, np.zeros((40, 4)))
+    assert not other[8:-8, 9].any()
+    assert other[8:-8, 10].max() > 0
+
+
+def test_loudness_is_told_against_the_mean_of_the_song():
+    level = np.concatenate([np.full((60, 2), 1.0), np.full((60, 2), 3.0)])
+    found = pulse_features(level, np.array([100.0, 800.0]), np.zeros((60, 4)))[:, 11]
+    np.testing.assert_allclose(found[[15, 45]], [-1.0, 1.0])
+    loud = pulse_features(np.concatenate([0 * level, 9 + 0 * level]), np.array([100.0, 800.0]), np.zeros((120, 4)))
+    assert np.abs(loud[:, 11]).max() == 2.0
+
+
+def test_a_soft_band_is_not_blown_up_to_a_loud_one():
+    """Bands are scaled to their own onsets, but never by more than a tenth of the strongest allows."""
+    level = np.zeros((400, 2))
+    for at in range(20, 400, 40):
+        level[at : at + 4, 0], level[at : at + 4, 1] = 4.0, 0.02
+    found = pulse_features(level, np.array([60.0, 3500.0]), np.zeros((200, 4)))
+    assert found[:, 0].max() > 5 * found[:, 6].max()
+
+
+def test_an_odd_number_of_frames_is_halved_upwards():
+    assert pulse_features(np.zeros((7, 2)), np.array([100.0, 800.0]), np.zeros((4, 4))).shape == (4, 16)
