@@ -228,3 +228,28 @@ def test_every_length_and_rate_must_be_above_nothing(clips, phrases):
         assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=30.0, duration_s=0.0)
     with pytest.raises(ValueError, match="at least one"):
         assemble(phrases(), clips, skeleton=CANONICAL, frame_rate_hz=30.0, duration_s=1.0)
+
+
+def upright(*, feet_behind_m=0.0, feet_up_m=0.0):
+    """A body that stands still, its feet behind its hips or in the air."""
+    n = 150
+    foot = np.zeros((2, n, 3))
+    foot[..., 0], foot[..., 1], foot[..., 2] = np.array([[0.1], [-0.1]]), 0.08 + feet_up_m, -feet_behind_m
+    zero, arms = np.zeros(n), np.full((2, n), 0.3)
+    hips = np.tile([0.0, 0.85, 0.0], (n, 1))
+    return pose(Figure(hips, zero, zero, zero, zero, foot, 0 * arms, arms, 0 * arms, arms), 30.0)
+
+
+@pytest.mark.parametrize(("feet_up_m", "stays"), [(0.0, "feet"), (0.25, "root")])
+def test_a_clip_stands_on_feet_planted_on_both_sides_of_a_seam_else_by_its_root(phrases, feet_up_m, stays):
+    both = {"over": upright(), "before": upright(feet_behind_m=0.1, feet_up_m=feet_up_m)}
+    steps = phrases(("over", 0.5, 4, 0.5, 0.5), ("before", 0.5, 4, 0.5, 0.5), blend_s=0.4)
+    made = assemble(steps, both, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=4.0)
+    feet = [CANONICAL.joints.index(f"{side}Foot") for side in ("left", "right")]
+    moved_m = np.linalg.norm((made.position_xyz_m[-1] - made.position_xyz_m[0])[:, [0, 2]], axis=1)
+    if stays == "feet":
+        assert moved_m[feet].max() < 0.01
+        assert moved_m[0] == pytest.approx(0.1, abs=0.01)
+    else:
+        assert moved_m[0] < 1e-6
+        np.testing.assert_allclose(moved_m[feet], 0.1, atol=1e-3)
