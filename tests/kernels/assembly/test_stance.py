@@ -82,3 +82,51 @@ def test_a_standing_clip_stands(clips):
     found = clip_contacts(clip, position)
     assert found.ankle_height_m == grounding.ANKLE_HEIGHT_M
     assert found.foot.mean() > 0.9
+
+
+def test_a_body_beside_its_feet_still_rests_a_little_on_the_further_one(standing):
+    """Hips half a metre to the left of both feet: the right one counts a twentieth, not nothing and not less."""
+    lean = standing.copy()
+    lean[[k for k in range(22) if k not in FEET], 0] += 0.5
+    wide = lean.copy()
+    wide[[grounding.ANKLES[1], grounding.TOES[1]], 2] += 0.1
+    right = np.zeros((2, 2))
+    right[:, 1] = 1.0
+    angle, shift = meet(lean, wide, right, heading_rad=0.0)
+    assert np.linalg.norm(moved(wide, angle, shift) - wide, axis=-1).max() > 0.01
+
+
+def test_a_faint_memory_of_root_and_heading_keeps_a_body_facing_where_it_faced(standing):
+    """One planted point alone could be met by any turn: the body does not turn."""
+    other = standing.copy()
+    other[FEET] += [0.04, 0.0, 0.0]
+    one = np.zeros((2, 2))
+    one[1, 0] = 1.0
+    angle, shift = meet(standing, other, one, heading_rad=0.0)
+    assert abs(angle) < 0.3
+    toe = grounding.TOES[0]
+    assert np.linalg.norm(moved(other, angle, shift)[toe] - standing[toe]) < 0.02
+    assert shift[1] == 0
+
+
+def test_points_count_as_surely_as_they_are_planted(standing):
+    """The left foot wants to go one way and the right the other: the surer one has its way."""
+    other = standing.copy()
+    other[[grounding.ANKLES[0], grounding.TOES[0]], 2] += 0.1
+    other[[grounding.ANKLES[1], grounding.TOES[1]], 2] -= 0.1
+    for surer in (0, 1):
+        planted = np.full((2, 2), 0.05)
+        planted[:, surer] = 1.0
+        angle, shift = meet(standing, other, planted, heading_rad=0.0)
+        off = np.linalg.norm((moved(other, angle, shift) - standing)[grounding.ANKLES], axis=-1)
+        assert off[surer] < off[1 - surer]
+
+
+def test_a_stretch_of_one_instant_is_its_nearest_frame():
+    stands = np.zeros((10, 2), bool)
+    stands[4] = True
+    contacts = FootContacts(stands, stands, 0.0, 0.0, 0.0)
+    np.testing.assert_array_equal(planted_share(contacts, 0.42, 0.42, 10.0), np.ones((2, 2)))
+    np.testing.assert_array_equal(planted_share(contacts, 0.46, 0.46, 10.0), np.zeros((2, 2)))
+    np.testing.assert_array_equal(planted_share(contacts, -5.0, -4.0, 10.0), np.zeros((2, 2)))
+    np.testing.assert_allclose(planted_share(contacts, 0.3, 0.5, 10.0), np.full((2, 2), 1 / 3))

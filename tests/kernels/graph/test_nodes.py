@@ -55,3 +55,27 @@ def test_errors():
         beat_nodes([np.array([1.5])], [1.0])
     with pytest.raises(ValueError, match="time_s: want"):
         BeatNodes(np.zeros(2, int), np.zeros(1), np.ones(2))
+
+
+def test_a_beat_may_lie_a_last_bit_past_its_clip_and_no_further():
+    assert len(beat_nodes([np.array([1.0 + 5e-7])], [1.0])) == 1
+    with pytest.raises(ValueError, match="0 to the clip's duration"):
+        beat_nodes([np.array([1.00001])], [1.0])
+    with pytest.raises(ValueError, match="0 to the clip's duration"):
+        beat_nodes([np.array([-0.1])], [1.0])
+    with pytest.raises(ValueError, match="sorted by clip"):
+        BeatNodes(np.array([-1]), np.zeros(1), np.ones(1))
+
+
+def test_clips_may_begin_at_the_same_time_and_be_left_out(nodes):
+    other = BeatNodes(np.array([0, 3]), np.array([0.5, 0.5]), np.ones(2))
+    assert other.next_node.tolist() == [-1, -1]
+    assert [part.tolist() for part in other.same_moment(9.0)] == [[0, 1], [1, 2]]
+
+
+def test_a_margin_is_kept_to_the_bit():
+    nodes = beat_nodes([np.array([0.25, 0.5, 0.75])], [1.0])
+    assert nodes.may_leave(0.25).tolist() == [False, True, True]
+    assert nodes.may_enter(0.25).tolist() == [True, True, False]
+    assert nodes.may_leave(0.2501).tolist() == [False, True, False]
+    assert nodes.may_enter(0.2501).tolist() == [False, True, False]

@@ -97,3 +97,26 @@ def test_empty_graph_and_lone_beats(make_graph, prune):
     lone = prune(make_graph([[0.5], [0.5]]))
     assert lone.total_s == 0
     assert lone.n_nodes_lost == (0 if prune is keep_all else 2)
+
+
+def test_a_node_without_any_edge_goes_and_a_pair_joined_both_ways_counts_once(make_graph):
+    # clip 0 is a lone beat; the transitions 1 -> 3 and 3 -> 1 are one edge of degree, beside the way on
+    graph = make_graph([[0], [0, 1], [0, 1]], [(1, 3, 1.0)])
+    assert not remove_dead_ends(graph).is_kept.any()
+    ring = make_graph([[0], [0, 1], [0, 1]], [(1, 3, 1.0), (2, 4, 1.0)])
+    np.testing.assert_array_equal(remove_dead_ends(ring).is_kept, [0, 1, 1, 1, 1])
+
+
+def test_nodes_entered_by_a_jump_and_danced_on_from_belong_to_the_strongest(make_graph):
+    """No step ends on the first beat of a clip, yet the loop needs it: it is kept where the loop enters there."""
+    graph = make_graph([[0, 1], [0, 1]], [(1, 2, 1.0), (3, 0, 1.0)], both_ways=False)
+    assert keep_strongest(graph).is_kept.all()
+    beside = make_graph([[0, 1], [0, 1], [0, 1]], [(1, 2, 1.0), (3, 0, 1.0), (1, 4, 1.0)], both_ways=False)
+    np.testing.assert_array_equal(keep_strongest(beside).is_kept, [1, 1, 1, 1, 0, 0])
+
+
+def test_time_is_lost_where_either_beat_is(make_graph):
+    graph = make_graph([[0, 1, 3, 6]], [(2, 1, 1.0)], both_ways=False)
+    got = keep_strongest(graph)
+    np.testing.assert_array_equal(got.is_kept, [False, True, True, False])
+    assert (got.lost_s, got.total_s, got.n_clips_lost) == (4.0, 6.0, 0)
