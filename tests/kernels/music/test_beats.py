@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from assets.formats import audio, beats_file
-from kernels.music.beats import TRACKERS, track_beats
+from kernels.music.beats import TRACKERS, _candidates, track_beats
 from kernels.synthetic.drum_machine import CLICKS, beat_times, click_train, drum_machine_song
 
 RATE = 22050
@@ -170,3 +170,38 @@ def test_real_songs(data_dir):
         found = track_beats(sound.samples, sound.sample_rate_hz).grid.time_s
         scores.append(f_measure(beats_file.read(path).time_s, found))
     assert np.mean(scores) > 0.75
+
+
+def pulses(tempo_bpm, seconds=20):
+    """How much each hundredth of a second looks like a beat, for a plain pulse."""
+    probability = np.full(int(seconds * 100), 0.02)
+    probability[np.rint(np.arange(0.3, seconds, 60 / tempo_bpm) * 100).astype(int)] = 0.9
+    return probability
+
+
+@pytest.mark.parametrize(("tempo_bpm", "left_out"), [(60, 1 / 3), (45, 1 / 2), (170, 3.0), (230, 2.0)])
+def test_tempi_that_nobody_taps_are_no_candidates(tempo_bpm, left_out):
+    found = _candidates(pulses(tempo_bpm), float(tempo_bpm))
+    assert left_out not in [c.level_ratio for c in found]
+    assert all(25 <= c.tempo_bpm <= 450 * 1.08 for c in found)
+    assert [c.level_ratio for c in found if c.is_chosen] == [1.0]
+
+
+def test_thirds_are_candidates_only_where_half_or_double_is_no_better():
+    straight = {c.level_ratio for c in _candidates(pulses(120), 120.0)}
+    assert {0.5, 1.0, 2.0} <= straight
+    for found in (_candidates(pulses(120), 120.0), _candidates(pulses(90), 90.0)):
+        score = {c.level_ratio: c.score for c in found}
+        least = min(score[r] for r in (0.5, 2.0) if r in score)
+        assert all(score[r] >= least for r in score if r in (1 / 3, 3.0))
+        assert max(score.values()) == 0
+
+
+def test_a_song_too_short_for_two_beats_has_no_candidates():
+    assert _candidates(np.full(10, 0.5), 120.0) == ()
+
+
+def test_an_audible_click_alone_and_a_song_of_less_than_two_beats_have_no_grid():
+    sound = drum_machine_song(tempo_bpm=120, n_bars=4).render(sample_rate_hz=RATE)[:, 0]
+    assert len(track_beats(sound[: RATE // 10], RATE).grid.time_s) == 0
+    assert len(track_beats(sound[: RATE // 100], RATE).grid.time_s) == 0
