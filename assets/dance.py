@@ -7,6 +7,7 @@ import dagster as dg
 import numpy as np
 import pyarrow as pa
 
+from assets.dancing.assembled import assemble_steps
 from assets.declare import table_asset, table_assets
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.plots.dance import contact_sheet, dance_timeline, measure_table
@@ -24,8 +25,6 @@ from assets.tables.choreography import (
 )
 from assets.tables.music import to_music_beat
 from kernels.assembly import foot_quality, quality, seam_quality
-from kernels.assembly.blend import assemble
-from kernels.assembly.feet import lock_feet, planted_feet
 from kernels.assembly.quality import Measure
 from kernels.assembly.timing import cover
 from kernels.skeleton.canonical import CANONICAL
@@ -58,17 +57,9 @@ def assembly(
     key = lake_key(context.partition_key)
     song_id, method = key.split("|")
     steps = to_choreography(choreography)
-    clips, settings = load_clips(canonical_pose, steps), studio.settings().dance
-    dance = assemble(
-        steps,
-        clips,
-        skeleton=CANONICAL,
-        frame_rate_hz=request_of(studio, key).frame_rate_hz or settings.frame_rate_hz,
-        duration_s=float(steps.song_end_s[-1]),
-        shape=settings.blend_shape,
+    dance = assemble_steps(
+        steps, canonical_pose, studio.settings().dance, frame_rate_hz=request_of(studio, key).frame_rate_hz
     )
-    if settings.lock_feet:
-        dance = lock_feet(dance, planted_feet(dance, steps, clips))
     progress.step()
     asked = request_version(studio, key)
     pose = from_dance_pose(song_id, method, dance)

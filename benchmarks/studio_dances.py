@@ -25,8 +25,8 @@ from assets.reading.songs import PlayedSong, played_song
 from assets.tables.graph import to_motion_graph
 from assets.tables.music import to_music_beat
 from kernels.types import Choreography, Clip, Float
-from pipelines.io_managers import StoredTable
 from pipelines.studio.lake import Lake
+from pipelines.studio.stored import StoredTable
 from schemas.settings import Settings
 
 REPOSITORY = Path(__file__).parents[1]

@@ -23,32 +23,10 @@ from pipelines.freshness import Freshness
 from pipelines.studio.files import LakeError, why, write_beside
 from pipelines.studio.folder import StudioFolder
 from pipelines.studio.lake import Lake
+from pipelines.studio.stored import StoredTable
 from schemas.catalog import TABLES
 from schemas.choreography import USD_ANIMATION
 from schemas.search import MOTION_INDEX
-
-
-class StoredTable:
-    """An upstream asset on disk; see :class:`assets.stamps.Stored`."""
-
-    def __init__(self, lake: Lake, asset: str, keys: Sequence[str]) -> None:
-        self._lake, self._asset, self._keys = lake, asset, list(keys)
-
-    @property
-    def keys(self) -> Sequence[str]:
-        """Partition keys that are part of this run, in order."""
-        return self._keys
-
-    def read(self, key: str = "", *, clip_ids: Iterable[str] | None = None) -> pa.Table:
-        """Read one partition, or only some clips of it."""
-        return self._lake.table(self._asset, key, clip_ids=clip_ids)
-
-    def stamp(self, key: str = "") -> Stamp:
-        """Read the stamp of a stored partition."""
-        stamp = self._lake.stamp(self._asset, key)
-        if stamp is None:
-            raise LakeError(f"{self._asset}: the partition {key!r} is not built; run 'odori build'")
-        return stamp
 
 
 class EarlierTables:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).parents[1]
-PACKAGES = ("pipelines", "assets", "kernels", "schemas")
+PACKAGES = ("odori", "pipelines", "assets", "kernels", "schemas")
 SOURCES = sorted(p for package in PACKAGES for p in (REPOSITORY / package).rglob("*.py"))
 TEXTS = sorted(
     p
@@ -36,7 +36,7 @@ def test_no_folder_or_file_is_named_for_nothing():
 
 def test_package_files_hold_one_docstring_and_no_imports():
     for path in SOURCES:
-        if path.name == "__init__.py":
+        if path.name == "__init__.py" and path.parent.name != "odori":  # the front door, which gives names
             assert re.fullmatch(r'"""[^"]+"""\n', path.read_text()), path
 
 

@@ -13,7 +13,7 @@ import pytest
 REPOSITORY = Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize("name", ["pipelines", "assets", "kernels", "schemas"])
+@pytest.mark.parametrize("name", ["odori", "pipelines", "assets", "kernels", "schemas"])
 def test_package_is_ours(name):
     assert Path(importlib.import_module(name).__file__).is_relative_to(REPOSITORY)
 
@@ -40,6 +40,7 @@ def named_in_contracts(*names):
         ("assets", ["only formats and sources", "sources and formats"]),
         ("pipelines", ["down the pipelines"]),
         ("kernels", ["down the kernels"]),
+        ("odori", ["down the front door"]),
     ],
 )
 def test_contracts_name_every_module(package, contracts):
@@ -55,6 +56,7 @@ PLANTED = [
     ("assets/dancing/refusal.py", "import dagster", "only asset areas and pipelines know Dagster"),
     ("assets/dancing/wishes.py", "import os", "only formats and sources touch files"),
     ("assets/tables/pack.py", "from assets import dance", "down the house"),
+    ("odori/exceptions.py", "from odori import opened", "down the front door"),
     ("kernels/ranks.py", "from kernels.hmm import model", "down the kernels"),
     ("kernels/ranks.py", "import pyarrow", "kernels are array code"),
     ("pipelines/studio/lake.py", "from pipelines import cli", "down the pipelines"),
@@ -66,7 +68,7 @@ PLANTED = [
 @pytest.mark.slow
 def test_each_contract_bites(tmp_path):
     """In a copy of the packages, one import planted for each contract: all are broken, and all are named."""
-    for package in ("pipelines", "assets", "kernels", "schemas"):
+    for package in ("odori", "pipelines", "assets", "kernels", "schemas"):
         shutil.copytree(REPOSITORY / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(REPOSITORY / "pyproject.toml", tmp_path)
     for path, line, _ in PLANTED:

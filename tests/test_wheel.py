@@ -24,7 +24,7 @@ from pipelines.processes import GROUP
 pytestmark = pytest.mark.slow
 
 REPOSITORY = Path(__file__).parents[1]
-PACKAGES = ("pipelines", "assets", "kernels", "schemas")
+PACKAGES = ("odori", "pipelines", "assets", "kernels", "schemas")
 PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 

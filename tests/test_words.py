@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).parents[1]
-PACKAGES = ("pipelines", "assets", "kernels", "schemas")
+PACKAGES = ("odori", "pipelines", "assets", "kernels", "schemas")
 KEY = re.compile(r"\[([A-Z][A-Za-z]+(?:19|20)\d\d)\]")
 REFERENCES = REPOSITORY / "docs" / "references.md"
 PAGES = [REPOSITORY / "README.md", REPOSITORY / "CHANGELOG.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]

@@ -1,16 +1,32 @@
 """What could be pinned at a place of a song: labels, styles and clips within reach, with what each would cost."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from assets.dancing.asked import Direction
-from assets.dancing.by_graph import GraphCatalogue, path_costs, pins_of, reach_of, search, strength_price, terms_of
+from assets.dancing.asked import Direction, direction_of
+from assets.dancing.by_graph import (
+    GraphCatalogue,
+    catalogue,
+    path_costs,
+    pins_of,
+    poses_of,
+    reach_of,
+    search,
+    strength_price,
+    terms_of,
+)
+from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import stretch
-from assets.reading.songs import PlayedSong
+from assets.reading.clips import read_clips
+from assets.reading.songs import PlayedSong, played_song
+from assets.sources.sources import Studio
+from assets.stamps import Stored
+from assets.tables.graph import to_motion_graph
+from assets.tables.music import to_music_beat
 from kernels.graph.moment_candidates import Proposals
 from kernels.graph.path import STEPS, first_beats, more_than_any
 from kernels.graph.pin_conflicts import admitted
@@ -51,6 +67,61 @@ def place_of(text: str, song: PlayedSong) -> Asked:
     wish: PinWish = parse_pin(f"{text}=anything")
     first, last = stretch(wish, song)
     return Asked(text, first, last, float(max(song.grid_s[first], 0.0)), float(min(song.grid_s[last], song.duration_s)))
+
+
+class PlaceError(ValueError):
+    """A place that is none of the song's."""
+
+
+INPUTS = (
+    *("song", "music_beat", "music_feature", "music_repeat"),
+    *("clip", "canonical_pose", "motion_graph_node", "motion_graph_edge"),
+)
+"""Tables that :func:`propose_at` reads."""
+
+
+def propose_at(
+    inputs: Mapping[str, Stored], studio: Studio, song: str, place: str, *, pins: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Price everything that could be pinned at a place of a song, from the tables of its studio.
+
+    Parameters
+    ----------
+    inputs : :data:`INPUTS` by name
+    studio : Studio
+    song : key
+    place : as a pin names it
+    pins : as typed, to be kept beside those of the brief
+
+    Returns
+    -------
+    dict
+        As :func:`propose`, and ``song``, ``place``, ``from_s``, ``to_s`` and ``pins``.
+
+    Raises
+    ------
+    RefusalError
+        If the song has no beats, or the pins cannot be kept.
+    PlaceError
+        If the place is none of the song's.
+    """
+    beats = to_music_beat(inputs["music_beat"].read(song))
+    if len(beats.time_s) < 2:
+        raise RefusalError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
+    duration_s = float(max(inputs["song"].read(song)["duration_s"].to_pylist()))
+    feature, repeat = (inputs[name].read(song) for name in ("music_feature", "music_repeat"))
+    played = played_song(beats, duration_s, feature=feature, repeat=repeat)
+    try:
+        at = place_of(place, played)
+    except ValueError as error:
+        raise PlaceError(str(error).replace(f"{place}=anything", place)) from error
+    asked = direction_of(studio, f"{song}|graph", pins=pins)
+    graph, clip_ids = to_motion_graph(inputs["motion_graph_node"].read(), inputs["motion_graph_edge"].read())
+    poses = poses_of(inputs["canonical_pose"], studio.settings())
+    known = catalogue(graph, clip_ids, read_clips(inputs["clip"]), asked.allow, poses=poses)
+    found = propose(known, played, studio.settings(), asked, at)
+    said: dict[str, Any] = {"song": song, "place": place, "from_s": at.from_s, "to_s": at.to_s}
+    return {**said, "pins": [wish.text for wish in asked.wishes], **found}
 
 
 def propose(
@@ -95,7 +166,7 @@ def propose(
         rows = [
             {
                 kind: str(names[i]),
-                "pin": f"{place.place}={_PREFIX[kind]}{names[i]}",
+                "pin": pin_text(place.place, kind, str(names[i])),
                 "extra_cost": float(prices.cost[i] % most) - found["best_cost"],
                 "steps_outside_warp_bounds": int(prices.cost[i] // most),
                 **(
@@ -110,6 +181,18 @@ def propose(
         found["out_of_reach"][f"{kind}s"] = names[is_named & np.isinf(prices.cost) & ~prices.is_left].tolist()
         found[f"unpriced_{kind}s"] = names[prices.is_left].tolist()
     return found
+
+
+def pin_text(place: str, kind: str, name: str) -> str:
+    """Write a pin as it is typed.
+
+    Parameters
+    ----------
+    place : as a pin names it
+    kind : of :data:`KINDS`
+    name : of the label, the style or the clip
+    """
+    return f"{place}={_PREFIX[kind]}{name}"
 
 
 def _of_clip(known: GraphCatalogue, place: Asked, node: int, best: int) -> Mapping[str, Any]:

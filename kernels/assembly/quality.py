@@ -28,6 +28,42 @@ class Measure:
     is_passed: bool | None = None
 
 
+LONGEST_BEAT_S = 20.0
+"""Chosen so that no music is refused and milliseconds are: 3 beats a minute, against beats 200 to 2000 apart."""
+
+
+def check_beats(name: str, time_s: Float) -> None:
+    """Refuse times that cannot be beats in seconds.
+
+    Parameters
+    ----------
+    name : of the argument, for the message
+    time_s : (B,) float
+
+    Raises
+    ------
+    ValueError
+        If the shape is another, a time is not finite or negative, times do not rise, or beats lie so far apart that
+        milliseconds, samples or frames must be meant.
+    """
+    if np.ndim(time_s) != 1:
+        raise ValueError(f"{name}: want (B,) seconds, got {np.shape(time_s)}")
+    if not np.isfinite(time_s).all():
+        raise ValueError(f"{name}: want finite seconds, got {time_s[~np.isfinite(time_s)][0]}")
+    if len(time_s) and np.min(time_s) < 0:
+        raise ValueError(f"{name}: want seconds >= 0, got {np.min(time_s):g}")
+    step_s = np.diff(time_s)
+    if not (step_s > 0).all():
+        at = int(np.flatnonzero(step_s <= 0)[0])
+        raise ValueError(
+            f"{name}: want rising times, got {time_s[at]:g} before {time_s[at + 1]:g}; sort them and drop repeats"
+        )
+    if len(step_s) and np.median(step_s) > LONGEST_BEAT_S:
+        raise ValueError(
+            f"{name}: want seconds, got beats {np.median(step_s):g} apart; were they given in milliseconds?"
+        )
+
+
 def f_measure(found_s: Float, wanted_s: Float, *, tolerance_s: float = 0.07) -> float:
     """Share of beats met, both ways, one to one: the F-measure of [Davies2009], as mir_eval computes it.
 
@@ -40,7 +76,30 @@ def f_measure(found_s: Float, wanted_s: Float, *, tolerance_s: float = 0.07) -> 
     -------
     float, 0 to 1
         0 when either is empty. The greedy walk in order of time is a largest matching on a line.
+
+    Raises
+    ------
+    ValueError
+        If either cannot be beats in seconds, :func:`check_beats`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from kernels.assembly.quality import f_measure
+    >>> f_measure(np.array([0.5, 1.0, 1.5]), np.array([0.52, 1.01, 1.9]))
+    0.6666666666666666
+
+    See Also
+    --------
+    beat_alignment : how near, instead of whether
+    beat_measures : of a dance, with the level of chance
     """
+    check_beats("found_s", found_s)
+    check_beats("wanted_s", wanted_s)
+    return _f(found_s, wanted_s, tolerance_s)
+
+
+def _f(found_s: Float, wanted_s: Float, tolerance_s: float = 0.07) -> float:
     if len(found_s) == 0 or len(wanted_s) == 0:
         return 0.0
     i = j = hits = 0
@@ -69,7 +128,29 @@ def beat_alignment(motion_s: Float, music_s: Float, *, sigma_s: float = 0.05) ->
     Returns
     -------
     float, 0 to 1; 0 when either is empty
+
+    Raises
+    ------
+    ValueError
+        If either cannot be beats in seconds, :func:`check_beats`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from kernels.assembly.quality import beat_alignment
+    >>> beat_alignment(np.array([0.5, 1.0]), np.array([0.5, 1.0, 9.0])).__round__(3)
+    0.667
+
+    See Also
+    --------
+    f_measure : share of beats met
     """
+    check_beats("motion_s", motion_s)
+    check_beats("music_s", music_s)
+    return _aligned(motion_s, music_s, sigma_s)
+
+
+def _aligned(motion_s: Float, music_s: Float, sigma_s: float = 0.05) -> float:
     if len(motion_s) == 0 or len(music_s) == 0:
         return 0.0
     after = (
@@ -124,13 +205,13 @@ def beat_measures(dance: Dance, music_beat_s: Float, *, seed: int = 0, n_shifts:
     duration_s = float(dance.time_s[-1]) if len(dance.time_s) else 0.0
     moved_s = kinematic_beats(dance.position_xyz_m, dance.frame_rate_hz) / dance.frame_rate_hz
     music_s = music_beat_s[(music_beat_s >= 0) & (music_beat_s <= duration_s)]
-    score, f = beat_alignment(moved_s, music_s), f_measure(moved_s, music_s)
+    score, f = _aligned(moved_s, music_s), _f(moved_s, music_s)
     rng = np.random.default_rng(seed)
     by_chance = np.zeros((n_shifts, 2))
     if len(moved_s) and len(music_s):
         for i in range(n_shifts):
             shifted_s = block_shifted(moved_s, duration_s, rng=rng)
-            by_chance[i] = beat_alignment(shifted_s, music_s), f_measure(shifted_s, music_s)
+            by_chance[i] = _aligned(shifted_s, music_s), _f(shifted_s, music_s)
     chance = by_chance[:, 0]
     p, f_p = (
         (1 + int(np.sum(level >= got))) / (1 + n_shifts) for level, got in zip(by_chance.T, (score, f), strict=True)

@@ -21,9 +21,9 @@ from assets.tables.motion import CanonicalClip
 from assets.tables.music import to_music_beat
 from kernels.assembly.timing import cover
 from pipelines.commands import hmm_report
-from pipelines.io_managers import StoredTable
 from pipelines.studio.files import StudioError, write_beside
 from pipelines.studio.folder import StudioFolder
+from pipelines.studio.stored import StoredTable
 from schemas.choreography import CHOREOGRAPHY
 from schemas.keys import alternative_number, base_method, mirrored, seen_label
 from schemas.pins import PinWish

@@ -5,21 +5,15 @@ from pathlib import Path
 from typing import Any
 
 from assets.dancing import proposals
-from assets.dancing.asked import direction_of
-from assets.dancing.by_graph import catalogue, poses_of
 from assets.dancing.methods import USUAL
 from assets.dancing.refusal import RefusalError
-from assets.reading.clips import read_clips
-from assets.reading.songs import played_song
-from assets.tables.graph import to_motion_graph
-from assets.tables.music import to_music_beat
-from pipelines import build
 from pipelines.commands.arguments import pin_texts, wanted_songs
 from pipelines.commands.outcome import DONE, NOTHING_DONE, Outcome
 from pipelines.commands.session import Session
-from pipelines.io_managers import StoredTable
 from pipelines.studio.files import LakeError, StudioError
 from pipelines.studio.folder import StudioFolder, existing
+from pipelines.studio.stored import StoredTable
+from schemas.catalog import TABLES
 
 LONGEST_TABLE = 12
 """Rows of candidates. Chosen by hand, to fit on a screen."""
@@ -40,33 +34,23 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
     StudioError
         If the place is none of the song's.
     """
-    lake = studio.lake
-    beats = to_music_beat(lake.table("music_beat", song))
-    if len(beats.time_s) < 2:
-        raise StudioError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
-    duration_s = float(max(lake.table("song", song)["duration_s"].to_pylist()))
-    feature, repeat = (lake.table(name, song) for name in ("music_feature", "music_repeat"))
-    played = played_song(beats, duration_s, feature=feature, repeat=repeat)
+    inputs = {name: _stored(studio, name, song) for name in proposals.INPUTS}
     try:
-        at = proposals.place_of(place, played)
-    except ValueError as error:
-        raise StudioError(f"--propose: {str(error).replace(f'{place}=anything', place)}") from error
-    asked = direction_of(studio, f"{song}|graph", pins=pins)
-    graph, clip_ids = to_motion_graph(lake.table("motion_graph_node"), lake.table("motion_graph_edge"))
-    clips = read_clips(StoredTable(lake, "clip", lake.keys("clip")))
-    poses = poses_of(StoredTable(lake, "canonical_pose", lake.keys("canonical_pose")), studio.settings())
-    known = catalogue(graph, clip_ids, clips, asked.allow, poses=poses)
-    try:
-        found = proposals.propose(known, played, studio.settings(), asked, at)
+        facts = proposals.propose_at(inputs, studio, song, place, pins=pins)
+    except proposals.PlaceError as error:
+        raise StudioError(f"--propose: {error}") from error
     except RefusalError as refused:
-        facts = {"error": refused.sentence, **refused.facts}
-        return Outcome(NOTHING_DONE, facts, troubles=[refused.sentence])
-    said: dict[str, Any] = {"song": song, "place": place, "from_s": at.from_s, "to_s": at.to_s}
-    facts = {**said, "pins": [wish.text for wish in asked.wishes], **found}
-    if found["best_cost"] is None:
+        told = {"error": refused.sentence, **refused.facts}
+        return Outcome(NOTHING_DONE, told, troubles=[refused.sentence])
+    if facts["best_cost"] is None:
         trouble = f"{song}: cannot be danced at all with the clips that 'allow' admits; 'odori dance' says why"
         return Outcome(NOTHING_DONE, {"error": trouble}, troubles=[trouble])
     return Outcome(DONE, facts, _report(facts))
+
+
+def _stored(studio: StudioFolder, name: str, song: str) -> StoredTable:
+    is_of_songs = TABLES[name].key[0] == "song_id"
+    return StoredTable(studio.lake, name, [song] if is_of_songs else studio.lake.keys(name))
 
 
 def _report(facts: Mapping[str, Any]) -> str:
@@ -118,9 +102,7 @@ def propose_pins(
     songs = wanted_songs(work.state, [wanted], studio)
     if len(songs) > 1:
         raise StudioError(f"--propose: want one song, got {len(songs)}")
-    key = f"{songs[0].key}|{USUAL}"
-    needed = {name for name in work.state.needed_for(key) if work.state.assets[name].kind != "dance"}
-    report = work.run(build.GROUPS, keys=lambda kind, one: kind != "song" or one == songs[0].key, assets=needed)
+    report = work.run_before_dance(songs[0].key, USUAL)
     try:
         return priced(studio, songs[0].key, place, pins)
     except LakeError as error:

@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlalchemy.exc import DBAPIError
 
+from assets.dancing.methods import METHODS
 from assets.formats.errors import FormatError
 from assets.motion import beat_settings
 from assets.stamps import Progress
@@ -16,6 +17,7 @@ from pipelines.definitions import build_definitions
 from pipelines.device_fallback import DeviceError, Devices, to_standard_error
 from pipelines.studio.files import StudioError
 from pipelines.studio.folder import StudioFolder
+from schemas.keys import base_method
 
 
 class Session:
@@ -61,6 +63,19 @@ class Session:
         finally:
             if hasattr(bar, "close"):
                 bar.close()
+
+    def run_before_dance(self, song: str, method: str) -> build.Report:
+        """Bring up to date what a dance of a song is chosen from, and not the dance.
+
+        Parameters
+        ----------
+        song : key
+        method : name of a method of dancing
+        """
+        key = f"{song}|{method}"
+        needed = {name for name in self.state.needed_for(key) if self.state.assets[name].kind != "dance"}
+        songs = {song} | (self.state.sources.performed_songs if METHODS[base_method(method)].learns else set())
+        return self.run(build.GROUPS, keys=lambda kind, one: kind != "song" or one in songs, assets=needed)
 
     def _say(self, line: str) -> None:
         self.notes.append(line)

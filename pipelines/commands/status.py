@@ -4,15 +4,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from assets.stamps import content_version
 from pipelines import build
 from pipelines.collection import freshness
 from pipelines.commands import device_report
 from pipelines.commands.outcome import DONE, SOME_REFUSED, Outcome
 from pipelines.freshness import Freshness, PartitionState
 from pipelines.studio.folder import StudioFolder, existing
-from schemas.motion import CANONICAL_POSE
-from schemas.music import SONG
+from pipelines.studio.inventory import clips_and_doubts, songs_found
 
 LONGEST_LIST = 40
 """Lines. Chosen by hand, to fit on a screen."""
@@ -33,7 +31,7 @@ def studio_status(root: Path, *, devices: bool = False) -> Outcome:
         )
     studio = existing(root)
     state = freshness(studio)
-    (clips, doubts), songs = _clips_and_doubts(state, studio), songs_of(state, studio)
+    (clips, doubts), songs = clips_and_doubts(state.sources, studio.lake), songs_of(state, studio)
     findings = state.findings()
     unmade = {(f.asset, f.key) for f in findings if f.state in ("stale", "missing")}
     is_begun = studio.dagster_home.is_dir()
@@ -97,62 +95,12 @@ def _unmade(assets: Iterable[dict[str, Any]]) -> list[str]:
 
 def clips_of(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
     """Every motion file with its state; "new" before it was looked at, "changed" where it was since."""
-    return _clips_and_doubts(state, studio)[0]
-
-
-def _clips_and_doubts(state: Freshness, studio: StudioFolder) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
-    """List the motion files, and what is doubtful about those that were read."""
-    stored = {}
-    for session in studio.lake.keys("clip"):
-        if studio.lake.stamp("clip", session) is None:  # of an older version: as if it were not there
-            continue
-        for row in studio.lake.table("clip", session).to_pylist():
-            stored[row["path"]] = row
-    unplaced = {session: _unplaced(state, session) for session in studio.lake.keys("canonical_pose")}
-    found: list[dict[str, Any]] = []
-    doubts: list[dict[str, str]] = []
-    for clip in state.sources.clips:
-        path = clip.path.encode("utf-8", "backslashreplace").decode()
-        row = stored.get(path)
-        seen = _seen(row, clip.sha256, clip.problem)
-        if seen["state"] == "read" and clip.key in unplaced.get(clip.session, ()):
-            seen = {"state": "refused", "reason": "its motion could not be brought to the canonical skeleton"}
-        warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
-        found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
-        doubts += [{"path": path, "warning": sentence} for sentence in warnings]
-    return found, doubts
-
-
-def _unplaced(state: Freshness, session: str) -> set[str]:
-    """Clips of a session that were read and have no canonical pose."""
-    stamp = state.stamp("canonical_pose", session)
-    return {clip for clip, made in stamp.clips.items() if made.content == _NO_POSE} if stamp else set()
-
-
-_NO_POSE = content_version(CANONICAL_POSE.empty())
+    return clips_and_doubts(state.sources, studio.lake)[0]
 
 
 def songs_of(state: Freshness, studio: StudioFolder) -> list[dict[str, Any]]:
     """List every music file with its state."""
-    stored = {}
-    for key in studio.lake.keys(SONG.name):
-        for row in studio.lake.table(SONG.name, key).to_pylist():
-            stored[row["path"]] = row
-    found = []
-    for song in state.sources.songs:
-        path = song.path.encode("utf-8", "backslashreplace").decode()
-        found.append({"path": path, "key": song.key, **_seen(stored.get(path), song.sha256, song.problem)})
-    return found
-
-
-def _seen(row: dict[str, Any] | None, sha256: str, problem: str) -> dict[str, Any]:
-    if problem:
-        return {"state": "refused", "reason": problem}
-    if row is None:
-        return {"state": "new", "reason": None}
-    if row["source_sha256"] != sha256:
-        return {"state": "changed", "reason": None}
-    return {"state": row["state"], "reason": row["reason"]}
+    return songs_found(state.sources, studio.lake)
 
 
 def counts(files: list[dict[str, Any]]) -> dict[str, int]:

@@ -48,6 +48,14 @@ class Lake:
         names = (p.name.removesuffix(".parquet") for p in folder.iterdir() if p.name.endswith(".parquet"))
         return sorted(key_of(name, windows=self._windows) for name in names)
 
+    def version(self, asset: str, key: str = "") -> tuple[int, float] | None:
+        """Size and time of a stored partition's file, which change when it is written; None when it is not stored."""
+        try:
+            found = self.path(asset, key).stat()
+        except OSError:
+            return None
+        return int(found.st_size), float(getattr(found, "st_mtime_ns", found.st_mtime))
+
     def stamp(self, asset: str, key: str = "") -> Stamp | None:
         """Stamp of a stored partition; None when it is not stored or was written by something else."""
         try:
