@@ -18,18 +18,18 @@ from typing import TYPE_CHECKING, Any
 from odori.exceptions import DanceRefusedError, InputError, OdoriError
 
 if TYPE_CHECKING:
+    from odori.answers import BeatTimes, CatalogueClip, CatalogueSong, Listing, PoseSequence, SearchHit
     from odori.arrays import SegmentMatch, match, motion_beats, score_beats, track_beats
-    from odori.dances import Draft, FrameOrigin, MadeDance, PinProposal
+    from odori.made_dances import Draft, FrameOrigin, MadeDance, PinProposal
     from odori.opened import OpenStudio, demo, open
-    from odori.records import BeatTimes, CatalogueClip, CatalogueSong, Listing, PoseSequence, SearchHit
     from odori.takes import MotionTake, read, song_beats
 
 _HOMES = {
     "arrays": ("SegmentMatch", "match", "motion_beats", "score_beats", "track_beats"),
-    "dances": ("Draft", "FrameOrigin", "MadeDance", "PinProposal"),
+    "made_dances": ("Draft", "FrameOrigin", "MadeDance", "PinProposal"),
     "takes": ("MotionTake", "read", "song_beats"),
     "opened": ("OpenStudio", "demo", "open"),
-    "records": ("BeatTimes", "CatalogueClip", "CatalogueSong", "PoseSequence", "Listing", "SearchHit"),
+    "answers": ("BeatTimes", "CatalogueClip", "CatalogueSong", "PoseSequence", "Listing", "SearchHit"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 

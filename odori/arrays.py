@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kernels.types import Float
+from odori.answers import BeatTimes
 from odori.exceptions import InputError, refused
-from odori.records import BeatTimes
 
 SLOWEST_RATE_HZ, FASTEST_RATE_HZ = 4_000.0, 768_000.0
 """Sample rates of sound that beats are looked for in, hertz: those of :mod:`assets.formats.audio`."""

@@ -18,8 +18,8 @@ from assets.dancing.methods import METHODS, USUAL, check_order
 from assets.sources.sources import brief_of
 from assets.tables.choreography import from_choreography, from_dance_pose, to_choreography
 from assets.tables.music import to_music_beat
-from odori.dances import Draft, PinProposal, dance_poses
 from odori.exceptions import DanceRefusedError, OdoriError, refused
+from odori.made_dances import Draft, PinProposal, dance_poses
 from pipelines.studio.folder import StudioFolder
 from pipelines.studio.stored import RememberedTable, TableMemory
 from schemas.catalog import TABLES

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from assets.tables.music import to_music_beat
 from assets.tables.pack import concat
-from odori.dances import MadeDance, dance_poses
+from odori.answers import BeatTimes, CatalogueClip, CatalogueSong, Listing, PoseSequence
 from odori.exceptions import OdoriError, refused
-from odori.records import BeatTimes, CatalogueClip, CatalogueSong, Listing, PoseSequence
+from odori.made_dances import MadeDance, dance_poses
 from pipelines.studio import inventory
 from pipelines.studio.folder import StudioFolder
 from schemas.catalog import TABLES

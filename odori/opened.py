@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
 
-from odori.dances import FrameOrigin, MadeDance, PinProposal, explain_frame
+from odori.answers import CatalogueClip, CatalogueSong, SearchHit
 from odori.exceptions import DanceRefusedError, OdoriError, refused
 from odori.holdings import Holdings
-from odori.records import CatalogueClip, CatalogueSong, SearchHit
+from odori.made_dances import FrameOrigin, MadeDance, PinProposal, explain_frame
 from pipelines.caches import settle
 from pipelines.studio.folder import StudioFolder, existing
 
 if TYPE_CHECKING:
-    from odori.dances import Draft
     from odori.drafts import DraftRoom
+    from odori.made_dances import Draft
 
 
 def open(folder: str | PathLike[str] = "studio") -> OpenStudio:

@@ -11,8 +11,8 @@ import numpy as np
 
 from kernels.skeleton.naming import JointMapping
 from kernels.types import Clip, Float
+from odori.answers import BeatTimes, PoseSequence
 from odori.exceptions import OdoriError, refused
-from odori.records import BeatTimes, PoseSequence
 
 
 @dataclass(frozen=True, eq=False)

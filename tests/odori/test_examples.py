@@ -10,7 +10,15 @@ import pytest
 import odori
 
 MODULES = (
-    *("odori", "odori.arrays", "odori.dances", "odori.exceptions", "odori.holdings", "odori.opened", "odori.records"),
+    *(
+        "odori",
+        "odori.arrays",
+        "odori.made_dances",
+        "odori.exceptions",
+        "odori.holdings",
+        "odori.opened",
+        "odori.answers",
+    ),
     *("odori.takes", "kernels.assembly.quality"),
 )
 

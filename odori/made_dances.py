@@ -13,8 +13,8 @@ import numpy as np
 import pyarrow as pa
 
 from assets.tables.pack import frame_rate_hz, to_array
+from odori.answers import PoseSequence
 from odori.exceptions import refused
-from odori.records import PoseSequence
 from pipelines.studio.folder import StudioFolder
 
 if TYPE_CHECKING:

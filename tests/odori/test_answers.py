@@ -3,7 +3,7 @@ import pytest
 
 import odori
 from kernels.skeleton.canonical import JOINTS
-from odori.records import BeatTimes, CatalogueSong, Listing, PoseSequence
+from odori.answers import BeatTimes, CatalogueSong, Listing, PoseSequence
 
 
 @pytest.fixture
