@@ -10,16 +10,15 @@ import pytest
 import odori
 
 MODULES = (
-    *(
-        "odori",
-        "odori.arrays",
-        "odori.made_dances",
-        "odori.exceptions",
-        "odori.holdings",
-        "odori.opened",
-        "odori.answers",
-    ),
-    *("odori.takes", "kernels.assembly.quality"),
+    "odori",
+    "odori.answers",
+    "odori.arrays",
+    "odori.exceptions",
+    "odori.holdings",
+    "odori.made_dances",
+    "odori.opened",
+    "odori.takes",
+    "kernels.assembly.quality",
 )
 
 
