@@ -9,6 +9,7 @@ from typing import Any
 import draw
 
 WORDS = Path(__file__).with_name("words.json")
+"""A word for a survivor, by its key without the file: a file that is renamed keeps its words."""
 LISTING = draw.REPOSITORY / "docs" / "mutants.md"
 
 
@@ -59,7 +60,7 @@ def write(held: dict[str, Any], mutants: list[draw.Mutant]) -> None:
         if verdict == "undecided" and total["undecided"]:
             lines += ["", "## Undecided", ""]
         for key in sorted(k for k, v in held.items() if v["verdict"] == verdict):
-            word = words.get(key, "owed") if verdict == "survived" else held[key]["by"]
+            word = words.get(key.split(" ", 1)[1], "owed") if verdict == "survived" else held[key]["by"]
             mutant = place[key]
             lines += [f"- {mutant.path}:{mutant.line_number()} {mutant.place}: {word}", ""]
             lines += [f"      - {mutant.old}", f"      + {mutant.new}", ""]

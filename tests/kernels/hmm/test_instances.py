@@ -39,6 +39,14 @@ def test_what_is_cheap_by_itself_is_on_the_list_and_what_is_to_be_kept():
     assert shortlist(alone, here, own, seam=seam, keep=np.array([0]), most=3)[0].tolist() == [0, 1, 2]
 
 
+def test_a_motion_that_nothing_goes_before_follows_no_other():
+    """Motion 1 follows 0; 2 and 3 begin their clips and are cheaper, and 4, the last of all, may be danced before."""
+    clip, start_s = np.array([0, 0, 1, 2, 3]), np.array([0.0, 0.5, 0.0, 0.0, 0.0])
+    some = Motions(clip, np.zeros(5, np.int64), start_s, start_s + 0.5)
+    here, own = [np.array([0, 4]), np.array([1, 2, 3])], [np.zeros(2), np.array([10.0, 0.0, 1.0])]
+    assert shortlist(some, here, own, seam=np.zeros(5), most=2)[1].tolist() == [1, 2]
+
+
 def test_a_step_without_any_motion_is_refused():
     none = np.zeros(0, np.int64)
     with pytest.raises(ValueError, match="step 1: want at least one motion"):

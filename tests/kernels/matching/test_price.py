@@ -47,6 +47,8 @@ def test_a_piece_costs_its_pace_squared_and_is_easy_within_a_tenth(numerator):
 
 def test_a_pace_beyond_a_tenth_is_not_easy():
     assert not laid(56).is_easy
+    assert laid(55).is_easy  # the song lasts 0.91 as long as the clip
+    assert not laid(45).is_easy  # and 1.11 times as long
 
 
 def test_weights_price_the_match_and_what_lacks_to_agreement():
