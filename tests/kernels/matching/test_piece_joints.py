@@ -43,6 +43,15 @@ def test_a_blend_without_any_room_costs_the_margin(stepping):
     assert roomless.cost[0, 0] - free.cost[0, 0] == pytest.approx(MARGIN_COST)
 
 
+@pytest.mark.parametrize(("pace", "room_s", "lacks"), [(0.5, 0.15, 0.0), (2.0, 0.3, 0.25), (1.0, 0.15, 0.25)])
+def test_room_for_a_blend_is_counted_at_the_clips_own_pace(stepping, pace, room_s, lacks):
+    end_s = stepping[1][1] - room_s
+    with_blend, free = (
+        joint(stepping, (end_s - pace, end_s), (1.0, 1.0 + pace), blend_s).cost[0, 0] for blend_s in (0.4, 0.0)
+    )
+    assert with_blend - free == pytest.approx(MARGIN_COST * lacks)
+
+
 def test_of_one_span_there_is_no_joint(stepping):
     _, joints = joints_of(
         [[MatchPiece("s", 0.0, 1.0, 1, 0.0, 0.0, 0.0)]],
