@@ -144,3 +144,39 @@ def test_costs_stand_at_the_first_step_of_their_span_and_sum_to_the_whole(two_sp
         assert not np.any(values[~first]), name
     assert sum(values.sum() for values in two_spans.costs.values()) == pytest.approx(two_spans.metadata["cost"])
     assert (two_spans.costs["match_cost"][first] > 0).all()
+
+
+def one_place(*found):
+    """Matches of one segment: (clip, first frame, score, mutual ratio) each, at their own pace."""
+    clip, start, score, mutual = zip(*found, strict=True)
+    n = len(found)
+    at = np.array(start, np.int64)
+    return StoredMatches(clip, np.full(n, 50), at, np.array(score), np.ones(n), np.array(mutual))
+
+
+@pytest.mark.parametrize(("price", "clips"), [(0.0, {"a"}), (0.01, {"a", "b"}), (5.0, {"a"})])
+def test_poses_connect_before_anything_else_unless_a_seam_has_a_price(stored_poses, price, clips):
+    """The second segment's better match does not connect; its worse one goes on in the first one's clip."""
+    segments = Segments(*(np.array(v) for v in ([0.0, 2.0], [2.0, 4.0], [0, 240], [240, 240])), np.zeros(2))
+    found = LoadedMatches(
+        segments,
+        STEPS,
+        np.ones(600),
+        [one_place(("a", 0, 3.0, 0.8)), one_place(("b", 0, 3.0, 0.8), ("a", 240, 2.0, 0.2))],
+        CLIPS,
+    )
+    poses = stored_poses(RATE_HZ, a=np.tile(STILL, 2), b=1.0 + np.tile(TURN, 2))
+    weights = MatchPathSettings(other_starts=0, seam_weight=0.0, unconnected_cost=price)
+    danced = by_matching(found, poses, np.arange(0, 4.5, 0.5), Settings(match_path=weights))
+    assert set(danced.steps.clip_id) == clips
+    assert danced.metadata["seams_beyond_thresholds"] == len(clips) - 1
+
+
+def test_a_segment_that_is_licensed_to_no_clip_is_danced_by_others(stored_poses):
+    segments = Segments(*(np.array(v) for v in ([0.0, 2.0], [2.0, 4.0], [0, 240], [240, 240])), np.zeros(2))
+    none = StoredMatches((), *(np.zeros(0, np.int64) for _ in range(2)), *(np.zeros(0) for _ in range(3)))
+    found = LoadedMatches(segments, STEPS, np.ones(600), [one_place(("a", 0, 3.0, 0.8)), none], CLIPS)
+    poses = stored_poses(RATE_HZ, a=np.tile(STILL, 2), b=np.tile(STILL, 2))
+    danced = by_matching(found, poses, np.arange(0, 4.5, 0.5), Settings())
+    assert danced.metadata["spans_without_a_match"] == 1
+    assert danced.steps.song_end_s[-1] == 4.0
