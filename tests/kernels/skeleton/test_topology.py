@@ -125,3 +125,10 @@ def test_trunk():
     spine, neck = topology.trunk(CANONICAL, {name: name for name in JOINTS})
     assert [JOINTS[k] for k in spine] == ["spine", "chest", "upperChest"]
     assert [JOINTS[k] for k in neck] == ["neck", "head"]
+
+
+def test_what_is_longer_than_a_leg_is_no_head():
+    skeleton = rig(names=NAMELESS)
+    for name, length_m, is_head in (("crest", 0.2, True), ("mast", 0.8, False)):
+        tree = graft(skeleton, name, NAMELESS["head"], [0, length_m, 0])
+        assert (topology.find_body(tree, sides=[""] * len(tree.joints)) is not None) == is_head
