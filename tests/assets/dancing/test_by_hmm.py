@@ -66,6 +66,10 @@ def test_a_pool_takes_pinned_clips_first_then_performances_then_by_name(monkeypa
     names, motions = by_hmm._pool(usable, {"e"}, {"d"})
     assert names == ("a", "d", "e")  # the last one fills it to the brim and over
     np.testing.assert_array_equal(motions.clip_index, [0, 0, 1, 1, 2, 2])
+    monkeypatch.setattr(by_hmm, "LARGEST_POOL", 2)
+    assert by_hmm._pool(usable, {"e"}, {"d"})[0] == ("e",)
+    assert by_hmm._pool(usable, set(), {"d"})[0] == ("d",)
+    monkeypatch.setattr(by_hmm, "LARGEST_POOL", 5)
     names, motions = by_hmm._pool(usable, set(), set())
     assert names == ("a", "b", "c")
     assert len(motions.start_s) == 6
