@@ -99,12 +99,14 @@ def test_a_short_visit_to_the_other_side_is_left_to_the_outliers(n, n_mirrored):
 
 
 def test_with_fewer_than_three_sensors_nothing_is_compared():
-    position = around((-0.9, 0.3, 0.0))
+    place = np.tile([-0.9, 0.3, 0.0], (60, 1))
+    place[30:] *= -1
+    position = around(place)
     is_usable = np.ones((60, 4), bool)
     is_usable[:, :2] = False
     mended, found = turned_back(position, is_usable)
-    np.testing.assert_array_equal(mended, position)
-    assert found == []
+    np.testing.assert_array_equal(mended[:, 3], np.tile([-0.9, 0.3, 0.0], (60, 1)))  # as it was before it jumped
+    assert [one.frame_index for one in found] == [30]
 
 
 def test_a_jump_that_noise_makes_shorter_for_one_step_is_still_one():
