@@ -49,8 +49,8 @@ def choreography(
     request = request_of(studio, key)
     with refusals_fail():
         asked = direction_of(studio, key)
+        check_order(method, song_id, asked)
         order = DanceOrder(song_id, beats, duration_s, studio.settings(), asked, request.temperature, request.seed)
-        check_order(method, order)
         danced = method.choose(inputs, order)
     progress.step()
     rows = from_choreography(song_id, way, danced.steps, danced.costs, danced.pin_ids, danced.states)

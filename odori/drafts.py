@@ -92,15 +92,15 @@ def draft_song(
         if way not in METHODS:
             raise OdoriError(f"method: want one of {', '.join(METHODS)}, got {way!r}")
         chosen = METHODS[way]
+        asked = direction_of(studio, f"{song}|{way}", pins=_without_likeness(studio, pins))
+        check_order(chosen, song, asked)
         names = ("song", "music_beat", "canonical_pose", *chosen.inputs)
         _make_where_lacking(room, names, song, way)
         beats = to_music_beat(room.stored("music_beat", song).read(song))
         if len(beats.time_s) < 2:
             raise OdoriError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
         duration_s = float(max(room.stored("song", song).read(song)["duration_s"].to_pylist()))
-        asked = direction_of(studio, f"{song}|{way}", pins=_without_likeness(studio, pins))
         order = DanceOrder(song, beats, duration_s, settings, asked, temperature, seed)
-        check_order(chosen, order)
         danced = chosen.choose({name: room.stored(name, song) for name in chosen.inputs}, order)
         rows = from_choreography(song, way, danced.steps, danced.costs, danced.pin_ids, danced.states)
         poses = room.stored("canonical_pose", song)

@@ -138,6 +138,7 @@ class Freshness:
         self._studio = studio
         self._stamps: dict[tuple[str, str], Stamp | None] = {}
         self._asked: set[str] = set()
+        self._prepared: set[str] = set()
 
     def ask(self, group: str) -> None:
         """Count the assets of a group made on demand among those there should be."""
@@ -166,6 +167,15 @@ class Freshness:
                 "back (is the share mounted?), or make an empty one"
             )
         return found
+
+    def prepare(self, key: str) -> None:
+        """Count a dance as asked for, here alone: what it is chosen from is there to be made, nothing is remembered.
+
+        Parameters
+        ----------
+        key : ``<song>|<method>``
+        """
+        self._prepared.add(key)
 
     def forget(self) -> None:
         """Look at the lake anew."""
@@ -214,7 +224,7 @@ class Freshness:
             return list(self.sources.songs_by_key())
         if kind == "dance":
             songs = set(self.keys("song"))
-            asked = {*self._studio.requests(), *self._lake.keys("choreography")}
+            asked = {*self._studio.requests(), *self._lake.keys("choreography"), *self._prepared}
             return sorted(k for k in asked if k.split("|")[0] in songs)
         return [""]
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from assets.dancing.method import DanceOrder, Method
+from assets.dancing.asked import Direction
+from assets.dancing.method import Method
 from assets.dancing.refusal import RefusalError
 from schemas import settings
 
@@ -27,20 +28,21 @@ ALTERNATIVES = tuple(
 """The second to fifth dance of a song by methods that have them, each unlike those before it."""
 
 
-def check_order(method: Method, order: DanceOrder) -> None:
+def check_order(method: Method, song_id: str, direction: Direction) -> None:
     """Refuse what a method cannot do.
 
     Parameters
     ----------
     method : Method
-    order : DanceOrder
+    song_id : key of the song
+    direction : what is asked of the dance
 
     Raises
     ------
     RefusalError
         If pins are asked of a method that keeps none.
     """
-    if order.direction.wishes and not method.keeps_pins:
+    if direction.wishes and not method.keeps_pins:
         able = [other.name for other in METHODS.values() if other.keeps_pins]
         ways = " or ".join(f"--method {name}" for name in able)
-        raise RefusalError(f"{order.song_id}: pins are kept by the methods {' and '.join(able)}; dance it with {ways}")
+        raise RefusalError(f"{song_id}: pins are kept by the methods {' and '.join(able)}; dance it with {ways}")

@@ -73,6 +73,7 @@ class Session:
         method : name of a method of dancing
         """
         key = f"{song}|{method}"
+        self.state.prepare(key)
         needed = {name for name in self.state.needed_for(key) if self.state.assets[name].kind != "dance"}
         songs = {song} | (self.state.sources.performed_songs if METHODS[base_method(method)].learns else set())
         return self.run(build.GROUPS, keys=lambda kind, one: kind != "song" or one in songs, assets=needed)

@@ -4,11 +4,13 @@ import doctest
 import importlib
 import inspect
 import shutil
+from pathlib import Path
 
 import pytest
 
 import odori
 
+REPOSITORY = Path(__file__).parents[2]
 MODULES = (
     "odori",
     "odori.answers",
@@ -52,3 +54,13 @@ def test_examples_run_in_any_folder(module, danced_demo, tmp_path, monkeypatch):
     result = doctest.testmod(importlib.import_module(module))
     assert result.attempted > 0
     assert result.failed == 0  # what was wanted and got is printed
+
+
+@pytest.mark.slow
+def test_the_walk_through_python_runs_in_any_folder(danced_demo, tmp_path, monkeypatch):
+    shutil.copytree(danced_demo, tmp_path / "demo")
+    monkeypatch.chdir(tmp_path)
+    result = doctest.testfile(str(REPOSITORY / "docs" / "python.md"), module_relative=False, encoding="utf-8")
+    assert result.attempted > 30
+    assert result.failed == 0
+    assert (tmp_path / "speed.png").stat().st_size > 10_000

@@ -58,6 +58,6 @@ def order(*pins):
 
 def test_a_method_that_keeps_no_pins_refuses_them_and_names_those_that_do():
     with pytest.raises(RefusalError, match="pins are kept by the methods graph and hmm; dance it with --method graph"):
-        check_order(METHODS["matching"], order("1=spin"))
-    check_order(METHODS["matching"], order())
-    check_order(METHODS["graph"], order("1=spin"))
+        check_order(METHODS["matching"], "waltz", order("1=spin").direction)
+    check_order(METHODS["matching"], "waltz", order().direction)
+    check_order(METHODS["graph"], "waltz", order("1=spin").direction)
