@@ -82,6 +82,8 @@ class Reach:
         else:
             found = {t for t, (_, held) in known["tests"].items() if block in held}
             shared = block in known["shared"] or (found and _is_cached(mutant))
+        if not mutant.block and Path(test_file) in _own(mutant.path):
+            shared = True  # a constant may be read by a test that calls nothing
         chosen = known["tests"] if shared or (not found and not mutant.block) else found
         return sorted((known["tests"][t][0], t) for t in chosen)
 
@@ -111,11 +113,11 @@ def _is_cached(mutant: draw.Mutant) -> bool:
 
 def judge(mutant: draw.Mutant, known: Reach, *, most_s: float, files: int) -> dict[str, Any]:
     """Run a mutant's tests until one fails: its verdict, and the test that killed it."""
-    left_s, reached, unusable = most_s, 0, 0
+    left_s, reached, usable = most_s, 0, 0
     source = mutant.source()
     for test_file in known.near(mutant.path)[:files]:
         tests = known.tests(mutant, test_file)
-        unusable += len(known.of(test_file)["unusable"])
+        usable += len(known.of(test_file)["tests"])
         chosen, spent = [], 0.0
         for seconds, test in tests:
             if not chosen or spent + seconds <= left_s:
@@ -137,7 +139,7 @@ def judge(mutant: draw.Mutant, known: Reach, *, most_s: float, files: int) -> di
         left_s -= spent
         if left_s <= 0:
             break
-    if not reached and unusable:
+    if not usable:
         return {"verdict": "undecided", "by": "its tests are skipped or fail here"}
     return {"verdict": "survived", "by": f"{reached} tests" if reached else "no test comes by"}
 
