@@ -9,7 +9,6 @@ whole, and binds its skeleton to the dance's animation: rest and bind pose, join
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,10 +21,20 @@ from assets.formats import usd_read
 from assets.formats.errors import FormatError
 from kernels import rotation
 from kernels.skeleton import kinematics
-from kernels.skeleton.body_fit import put_on
 from kernels.skeleton.body_measure import Character, measure
 from kernels.skeleton.naming import JointMapping, NoBodyError, map_joints
-from kernels.types import Clip, Float, Int, Skeleton
+from kernels.skeleton.rig_joints import (
+    Moves,
+    RestPose,
+    box_around,
+    local_matrices,
+    rest_pose,
+    resting_clip,
+    rig_moves,
+    similarity,
+    upright,
+)
+from kernels.types import Clip, Float, Int
 from schemas import stage_contract as contract
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
@@ -33,8 +42,6 @@ _FILE = re.compile(r"(?P<file>.+?\.usd[acz]?)(?::(?P<prim>/.*))?", re.IGNORECASE
 SHORTEST_M, TALLEST_M = 0.2, 10.0
 """Bodies that are danced on, from lowest joint to head: others are in another unit than their file says. Chosen by
 hand."""
-_UNEVEN = 0.01
-"""How unlike a matrix's three scales may be. Chosen by hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +53,7 @@ class UsdRig:
     file : name of the file
     root_path, skel_root_path, skeleton_path : prims, the first at the top of the file
     joints : J joint paths in the skeleton's order
-    parent : (J,) int64, -1 for roots, of which there may be several
-    rest_translation, rest_wxyz, rest_scale : (J, 3), (J, 4), (J,), local, in skeleton space
+    rest : RestPose of them
     scale, turn_wxyz, shift_xyz_m : from skeleton space to the world
     correction : (4, 4) float, from the file's axes and unit to the world, rows times matrix
     root_ops : names of the transforms of the prim at the top, outermost first; None where it can have none
@@ -61,10 +67,7 @@ class UsdRig:
     skel_root_path: str
     skeleton_path: str
     joints: tuple[str, ...]
-    parent: Int
-    rest_translation: Float
-    rest_wxyz: Float
-    rest_scale: Float
+    rest: RestPose
     scale: float
     turn_wxyz: Float
     shift_xyz_m: Float
@@ -73,19 +76,6 @@ class UsdRig:
     skel_root_to_world: Float
     mapping: JointMapping
     character: Character
-
-
-@dataclass(frozen=True, eq=False)
-class Moves:
-    """Samples of a SkelAnimation: (F, J, 4) rotations, (F, J, 3) translations, (J,) scales, local, in skeleton space.
-
-    ``position_xyz_m`` (F, J, 3) are the joints' places in the world.
-    """
-
-    rotation_wxyz: Float
-    translation: Float
-    scale: Float
-    position_xyz_m: Float
 
 
 def is_file(text: str) -> bool:
@@ -187,22 +177,15 @@ def _read(stage: Usd.Stage, name: str, root: Usd.Prim, prim: Usd.Prim, extra: Ma
     if not is_ordered:
         raise ValueError(f"want joints with parents before children, got: {why}")
     parent = np.array(topology.GetParentIndices(), np.int64)
-    translation, turned, scale = _rest(skeleton, parent, len(joints))
+    rest = _rest(skeleton, parent, len(joints))
     above = root.GetPath().GetPrefixes()[0]
     correction = _correction(stage)
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
     world = np.array(cache.GetLocalToWorldTransform(prim)) @ correction
-    unit, turn = _similarity(world[:3, :3], "the skeleton's own transform")
-    total = _accumulate(scale, parent)
-    position = _places(translation, turned, total, parent)
-    placed = unit * rotation.apply(turn, position) + world[3, :3]
-    names = _names(skeleton, joints)
-    rig, first = _upright(names, parent, placed)
-    rest = Clip(
-        rig, 1.0, placed[:1] if first == 0 else np.zeros((1, 3)), np.tile(rotation.IDENTITY, (1, len(rig.joints), 1))
-    )
-    mapping = map_joints(rig, extra)
-    character = measure(rest, mapping, floor_m=0.0)
+    unit, turn = similarity(world[:3, :3], "the skeleton's own transform")
+    body = upright(_names(skeleton, joints), parent, unit * rotation.apply(turn, rest.position) + world[3, :3])
+    mapping = map_joints(body, extra)
+    character = measure(resting_clip(body), mapping, floor_m=0.0)
     height_m = float(np.ptp(kinematics.rest_position(character.figure)[:, 1]))
     if not SHORTEST_M <= height_m <= TALLEST_M:
         raise ValueError(
@@ -215,10 +198,7 @@ def _read(stage: Usd.Stage, name: str, root: Usd.Prim, prim: Usd.Prim, extra: Ma
         str(root.GetPath()),
         str(prim.GetPath()),
         tuple(joints),
-        parent,
-        translation,
-        turned,
-        scale,
+        rest,
         unit,
         turn,
         world[3, :3],
@@ -239,55 +219,15 @@ def _correction(stage: Usd.Stage) -> Float:
     return matrix
 
 
-def _rest(skeleton: UsdSkel.Skeleton, parent: Int, n: int) -> tuple[Float, Float, Float]:
-    """Local rest pose: translations (J, 3), rotations (J, 4), scales (J,); from the bind pose where it has none."""
+def _rest(skeleton: UsdSkel.Skeleton, parent: Int, n: int) -> RestPose:
+    """Local rest pose of the n joints; from the bind pose where the skeleton has none."""
     local = np.array(skeleton.GetRestTransformsAttr().Get() or np.zeros((0, 4, 4)), np.float64)
     if local.shape != (n, 4, 4):
         bind = np.array(skeleton.GetBindTransformsAttr().Get() or np.zeros((0, 4, 4)), np.float64)
         if bind.shape != (n, 4, 4):
             raise ValueError(f"want a rest or bind transform for each of {n} joints, got {len(local)} and {len(bind)}")
-        local = np.array([bind[k] @ np.linalg.inv(bind[p]) if p >= 0 else bind[k] for k, p in enumerate(parent)])
-    if not np.isfinite(local).all():
-        raise ValueError("want a finite rest pose, got a NaN or infinity")
-    parts = [_similarity(m[:3, :3], f"the rest transform of joint {k}") for k, m in enumerate(local)]
-    return local[:, 3, :3], np.array([q for _, q in parts]), np.array([s for s, _ in parts])
-
-
-def _similarity(matrix: Float, what: str) -> tuple[float, Float]:
-    """Scale and rotation (4,) of a matrix (3, 3), rows times matrix; ValueError where it does anything else."""
-    length = np.linalg.norm(matrix, axis=-1)
-    scale = float(length.mean())
-    uneven = np.abs(matrix @ matrix.T / max(scale, 1e-12) ** 2 - np.eye(3)).max()
-    if not (scale > 1e-12 and uneven < _UNEVEN and np.linalg.det(matrix) > 0):
-        raise ValueError(f"want {what} to turn, move and scale evenly, got a shear, a mirror or uneven scales")
-    return scale, rotation.from_matrix((matrix / length[:, None]).T)
-
-
-def _accumulate(scale: Float, parent: Int) -> Float:
-    """Scale of each joint in skeleton space, (J,)."""
-    total = scale.copy()
-    for k, p in enumerate(parent.tolist()):
-        total[k] *= total[p] if p >= 0 else 1.0
-    return total
-
-
-def _places(translation: Float, turned: Float, total: Float, parent: Int) -> Float:
-    """Places (J, 3) of joints in skeleton space at rest."""
-    place, world = translation.copy(), turned.copy()
-    for k, p in enumerate(parent.tolist()):
-        if p >= 0:
-            place[k] = place[p] + total[p] * rotation.apply(world[p], translation[k])
-            world[k] = rotation.mul(world[p], turned[k])
-    return place
-
-
-def _turns(turned: Float, parent: Int) -> Float:
-    """Orientations (J, 4) in skeleton space at rest."""
-    world = turned.copy()
-    for k, p in enumerate(parent.tolist()):
-        if p >= 0:
-            world[k] = rotation.mul(world[p], turned[k])
-    return world
+        local = local_matrices(bind, parent)
+    return rest_pose(local, parent)
 
 
 def _names(skeleton: UsdSkel.Skeleton, joints: list[str]) -> list[str]:
@@ -298,23 +238,6 @@ def _names(skeleton: UsdSkel.Skeleton, joints: list[str]) -> list[str]:
         if len(names) == len(joints) == len(set(names)):
             return names
     return joints
-
-
-def _upright(names: list[str], parent: Int, placed: Float) -> tuple[Skeleton, int]:
-    """Joints in the world, frames parallel to it at rest; under one root, which is added where there are several.
-
-    The second value is the index of the first joint.
-    """
-    first = 0 if (parent < 0).sum() == 1 else 1
-    above = parent + first
-    above[parent < 0] = 0 if first else -1
-    offset = placed - np.where((parent >= 0)[:, None], placed[parent], 0.0)
-    if first == 0:
-        return Skeleton(tuple(names), above, offset), 0
-    return (
-        Skeleton(("(no joint)", *names), np.concatenate([[-1], above]), np.concatenate([np.zeros((1, 3)), offset])),
-        1,
-    )
 
 
 def moves(rig: UsdRig, fitted: Clip) -> Moves:
@@ -328,27 +251,11 @@ def moves(rig: UsdRig, fitted: Clip) -> Moves:
     Returns
     -------
     Moves
-        Joints keep their rest translations, but the hips, which travel.
+        As :func:`kernels.skeleton.rig_joints.rig_moves` has them.
     """
-    worn = put_on(fitted, rig.character)
-    first = len(worn.skeleton.joints) - len(rig.joints)
-    position, turned = (values[:, first:] for values in kinematics.place(worn))
-    at_rest = _turns(rig.rest_wxyz, rig.parent)
-    back = rotation.inv(rig.turn_wxyz)
-    # A joint's frame in skeleton space: what it turned in the world, seen from there, times its frame at rest.
-    here = rotation.mul(rotation.mul(back, rotation.mul(turned, rig.turn_wxyz)), at_rest)
-    place = rotation.apply(back, position - rig.shift_xyz_m) / rig.scale
-    local = here.copy()
-    translation = np.tile(rig.rest_translation, (len(here), 1, 1))
-    total = _accumulate(rig.rest_scale, rig.parent)
-    hips = rig.character.at["hips"] - first
-    for k, p in enumerate(rig.parent.tolist()):
-        if p >= 0:
-            local[:, k] = rotation.mul(rotation.inv(here[:, p]), here[:, k])
-        if k == hips:
-            way = place[:, k] - (place[:, p] if p >= 0 else 0.0)
-            translation[:, k] = rotation.apply(rotation.inv(here[:, p]), way) / total[p] if p >= 0 else way
-    return Moves(rotation.continuous(rotation.normalize(local)), translation, rig.rest_scale, position)
+    return rig_moves(
+        fitted, rig.character, rig.rest, scale=rig.scale, turn_wxyz=rig.turn_wxyz, shift_xyz_m=rig.shift_xyz_m
+    )
 
 
 def write_cast(layer: Sdf.Layer, rig: UsdRig, reference: str, moved: Moves) -> None:
@@ -376,10 +283,9 @@ def write_cast(layer: Sdf.Layer, rig: UsdRig, reference: str, moved: Moves) -> N
     skel_root = _bound(layer, rig.skel_root_path)
     size = float(np.ptp(kinematics.rest_position(rig.character.figure), axis=0).max()) / 2
     low, high = moved.position_xyz_m.min(axis=(0, 1)) - size, moved.position_xyz_m.max(axis=(0, 1)) + size
-    corner = np.array([[*c, 1.0] for c in itertools.product(*zip(low, high, strict=True))])
-    box = (corner @ np.linalg.inv(rig.skel_root_to_world))[:, :3]
+    box = box_around(low, high, rig.skel_root_to_world)
     extent = Sdf.AttributeSpec(skel_root, "extent", Sdf.ValueTypeNames.Float3Array)
-    extent.default = Vt.Vec3fArray([Gf.Vec3f(*map(float, edge)) for edge in (box.min(axis=0), box.max(axis=0))])
+    extent.default = Vt.Vec3fArray([Gf.Vec3f(*map(float, edge)) for edge in box])
 
 
 def _bound(layer: Sdf.Layer, path: str) -> Sdf.PrimSpec:

@@ -146,7 +146,7 @@ def test_what_cannot_dance_is_a_sentence(write_hero, tmp_path):
     hero = Usd.Stage.Open(str(write_hero(tmp_path / "hero.usda")))
     skeleton = UsdSkel.Skeleton(hero.GetPrimAtPath("/Hero/Rig/Skel"))
     skeleton.GetRestTransformsAttr().Set([])
-    assert usd_character._rest(skeleton, np.full(22, -1), 22)[0].shape == (22, 3)  # the bind pose stands in
+    assert usd_character._rest(skeleton, np.full(22, -1), 22).translation.shape == (22, 3)  # the bind pose stands in
     skeleton.GetBindTransformsAttr().Set([])
     hero.Save()
     with pytest.raises(FormatError, match="want a rest or bind transform for each of 22 joints, got 0 and 0"):
