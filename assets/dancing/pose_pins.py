@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from assets.dancing.wishes import DirectionError, stretch
 from assets.reading.clips import named_clips
@@ -15,17 +14,20 @@ from assets.stamps import Stored
 from assets.tables.motion import CanonicalClip
 from kernels.graph.beat_features import VELOCITY_TIME_S, BeatFeatures, beat_features
 from kernels.graph.distance import pose_distance
-from kernels.graph.path import STEPS
 from kernels.graph.pin_conflicts import Pin
-from kernels.graph.pose_nodes import furthest_ratio, pose_price, pose_ratio, pose_steps
-from kernels.graph.program import StepPrice, step_ends
+from kernels.graph.pose_nodes import (
+    ON_TIME_S,
+    PosePrice,
+    furthest_ratio,
+    is_own_moment,
+    pose_pin,
+    pose_ratio,
+    song_moment,
+)
 from kernels.graph.transitions import THRESHOLD
 from kernels.types import Float, MotionGraph
 from schemas.keys import is_mirrored, mirrored, source_clip
 from schemas.pins import PinWish
-
-ON_TIME_S = 1e-6
-"""A moment this near to a beat is on it, seconds. Chosen above the rounding of stored times, and far below a frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,85 +144,24 @@ def to_pose_pins(
     """
     asked = [wish for wish in wishes if wish.pose]
     wanted = [poses.wanted(wish) for wish in asked]
-    places = [_Moment(song, graph, wish) for wish in asked]
-    times = np.concatenate([graph.time_s[None], *(place.times for place in places)])
+    places = [song_moment(graph, song.grid_s, moment_of(wish, song)) for wish in asked]
+    times = np.concatenate([graph.time_s[None], *(place.times_s for place in places)])
     known = [pose for pose in wanted if pose is not None]
-    ratios = iter(poses.ratios(known, clip_ids, graph.clip_index.tolist(), times) if known else ())
+    ratios = iter(poses.ratios(known, clip_ids, graph.clip_index.tolist(), times) if known else np.zeros((0, 2, 1, 0)))
     row, pins = 1, {}
     for wish, pose, place in zip(asked, wanted, places, strict=True):
-        between, row = slice(row, row + len(place.times)), row + len(place.times)
+        between, row = slice(row, row + len(place.times_s)), row + len(place.times_s)
         if pose is None:
             none = np.zeros(len(graph.time_s), bool)
             pins[wish.text] = Pin(wish.text, place.first, place.first + 1, none)
-        else:
-            shown = _Shown(wish, graph, clip_ids, poses.threshold, weight)
-            pins[wish.text] = _pin(shown, place, next(ratios), times, between, len(song.grid_s) - 1)
+            continue
+        clip, at_s = wish.pose_moment
+        is_clip = np.array([name == clip for name in clip_ids] or [False])[graph.clip_index]
+        price = PosePrice(is_clip, at_s, poses.threshold, weight)
+        ratio: Float = next(ratios)
+        last = len(song.grid_s) - 1
+        pins[wish.text] = pose_pin(wish.text, graph, place, price, ratio[:, 0], ratio[:, between], last=last)
     return pins
-
-
-@dataclass(frozen=True, eq=False)
-class _Shown:
-    """What it costs to show a pose."""
-
-    wish: PinWish
-    graph: MotionGraph
-    clip_ids: tuple[str, ...]
-    threshold: float
-    weight: float
-
-    def price(self, apart: Float, shown_s: Float, is_usable: NDArray[np.bool_]) -> Float:
-        """Price of showing poses, (..., N), by ratios and metres (2, ..., N), and moments; one a row is its own."""
-        clip, at_s = self.wish.pose_moment
-        is_clip = np.array([name == clip for name in self.clip_ids] or [False])[self.graph.clip_index]
-        off_s = np.where(is_clip & is_usable, np.abs(shown_s - at_s), np.inf)
-        is_own = np.isfinite(off_s) & (off_s <= off_s.min(axis=-1, keepdims=True, initial=np.inf) + ON_TIME_S)
-        return pose_price(apart[0], apart[1], is_own, threshold=self.threshold, weight_per_m=self.weight)
-
-
-def _pin(shown: _Shown, place: "_Moment", ratio: Float, times: Float, between: slice, last: int) -> Pin:
-    """Make the pin of one wish; ``ratio`` and ``times`` of the nodes first, of steps over the moment in ``between``."""
-    graph, text = shown.graph, shown.wish.text
-    can_end = np.isin(np.arange(len(graph.time_s)), graph.next_node)
-    starting, ending = (shown.price(ratio[:, 0], graph.time_s, can) for can in (graph.next_node >= 0, can_end))
-
-    def steps_at(beat: int) -> StepPrice:
-        return pose_steps(graph, beat, ending if beat == last else starting, last)
-
-    steps = steps_at(place.beat) if not place.steps else {}
-    if place.steps:
-        price = shown.price(ratio[:, between], times[between], np.isfinite(times[between]))
-        steps = dict(zip(place.steps, price, strict=True))
-    every = np.ones(len(graph.time_s), bool)
-    return Pin(text, place.first, place.first + 1, every, steps, steps_at)
-
-
-class _Moment:
-    """A moment of a song: the beat it is on, or the steps that may pass over it and when in their clips.
-
-    ``first`` is the interval of the pin, ``beat`` the beat where the moment is on one; ``steps`` (music beat, kind) and
-    ``times`` (len(steps), N), NaN where a step cannot be danced, are empty there.
-    """
-
-    def __init__(self, song: PlayedSong, graph: MotionGraph, wish: PinWish) -> None:
-        grid_s = song.grid_s
-        last = len(grid_s) - 1
-        moment_s = moment_of(wish, song)
-        near = int(np.argmin(np.abs(grid_s - moment_s)))
-        self.steps: list[tuple[int, int]] = []
-        self.times = np.zeros((0, len(graph.time_s)))
-        if abs(grid_s[near] - moment_s) <= ON_TIME_S:
-            self.beat, self.first = near, min(near, last - 1)
-            return
-        self.beat = -1
-        self.first = int(np.searchsorted(grid_s, moment_s)) - 1
-        rows = []
-        for kind, ((_, d), end) in enumerate(zip(STEPS, step_ends(graph, STEPS), strict=True)):
-            for at in range(max(self.first - d + 1, 0), min(self.first, last - d) + 1):
-                part = (moment_s - grid_s[at]) / (grid_s[at + d] - grid_s[at])
-                clip_s = graph.time_s[end] - graph.time_s if len(end) else graph.time_s
-                rows.append(np.where(end >= 0, graph.time_s + part * clip_s, np.nan))
-                self.steps.append((at, kind))
-        self.times = np.array(rows).reshape(len(rows), len(graph.time_s))
 
 
 def moment_of(wish: PinWish, song: PlayedSong) -> float:
@@ -289,8 +230,7 @@ def shown_pose(
     name = mirrored(frame["clip_id"]) if frame["is_mirrored"] else frame["clip_id"]
     ratio = poses.ratios([pose], [name], [0], np.array([[shown_s]]))[0, 0, 0, 0]
     own = beats.filter((pl.col("clip_id") == clip) & ~pl.col("is_mirrored") & pl.col("is_kept"))["time_s"].to_numpy()
-    reach_s = max(np.abs(own - at_s).min(), np.diff(own).max(initial=0.0) / 2) if len(own) else 0.0
-    is_own = name == clip and abs(shown_s - at_s) <= reach_s + 0.05
+    is_own = name == clip and is_own_moment(shown_s, at_s, own)
     is_kept = bool(ratio < poses.threshold or is_own)
     if not is_kept and not len(own):
         names = [mirrored(c) if m else c for c, m in beats.filter("is_kept")["clip_id", "is_mirrored"].iter_rows()]
