@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import polars as pl
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from assets.dancing import hmm_wishes, licences
 from assets.dancing.asked import Direction
@@ -24,30 +23,24 @@ from assets.stamps import Stored, repeatable
 from assets.tables import hmm as hmm_tables
 from assets.tables.hmm import ClipMotions
 from kernels.assembly.timing import blend_widths, trim
-from kernels.hmm import durations
 from kernels.hmm.decode import Chain, decode_varied
+from kernels.hmm.durations import MotionGrid, motion_grid
 from kernels.hmm.evidence import Evidence
-from kernels.hmm.instances import Motions
+from kernels.hmm.instances import Motions, motions_of_clips
 from kernels.hmm.links import link
 from kernels.hmm.model import Model
-from kernels.hmm.places import MotionWish, Places, crowded_cost, keep_wishes, place
+from kernels.hmm.places import MotionWish, Places, crowded_cost, keep_wishes, place, unkept_cost
 from kernels.hmm.seams import Ends
 from kernels.hmm.span_reach import SpanReach
+from kernels.hmm.spans import log_lasting, shared_ratio, span_costs
 from kernels.hmm.viterbi import Spans, best_spans, sample_spans
-from kernels.matching.match_sequence import to_choreography
+from kernels.matching.match_sequence import at_first_steps, to_choreography
 from kernels.types import Float
 from schemas.settings import Settings
 
 LARGEST_POOL = 8_000
 """Motions a dance is chosen from: pinned clips first, then performances, then clips in order of their names. Chosen for
 memory and time, by hand."""
-
-LONGEST_SPAN = 8
-"""Parts of beats that a motion may last. Chosen for time, by hand."""
-
-LEAST_LOG = -12.0
-"""Log probability of a length in which a recording can be danced, however seldom motions of its kind are so long.
-Chosen by hand, far below any that is counted."""
 
 UNSURE = 0.5
 """Where nobody danced to a song, motions cost so much more at random, in the mean, drawn by the seed: else the one
@@ -131,12 +124,8 @@ def _pool(usable: Mapping[str, ClipMotions], pinned: set[str], performed: set[st
         taken.append(clip)
         n += len(usable[clip].state)
     taken.sort()
-    return tuple(taken), Motions(
-        np.repeat(np.arange(len(taken)), [len(usable[c].state) for c in taken]),
-        np.concatenate([usable[c].state for c in taken]),
-        np.concatenate([usable[c].start_s for c in taken]),
-        np.concatenate([usable[c].end_s for c in taken]),
-    )
+    each = [usable[clip] for clip in taken]
+    return tuple(taken), motions_of_clips([c.state for c in each], [c.start_s for c in each], [c.end_s for c in each])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,21 +134,12 @@ class HeardSong:
 
     Parameters
     ----------
-    grid_s : (G + D,) float64, seconds: the G intervals motions take, and D - 1 beyond
-    parts : intervals to a beat
-    is_beat : (G + D,) bool
+    grid : MotionGrid of G intervals
     log_likelihood : (G, K) float64, of what sounds in each interval
     """
 
-    grid_s: Float
-    parts: int
-    is_beat: NDArray[np.bool_]
+    grid: MotionGrid
     log_likelihood: Float
-
-    @property
-    def longest(self) -> int:
-        """Most intervals that a motion takes, D."""
-        return len(self.grid_s) - len(self.log_likelihood)
 
 
 def by_hmm(
@@ -184,44 +164,32 @@ def by_hmm(
     warmth = settings.hmm_path.temperature if temperature is None else temperature
     motions, weights = dancer.motions, settings.hmm_path
     music = listen(dancer, percussion, melody, song.grid_s, settings)
+    grid = music.grid
     ends = ends_of(motions, dancer.clip_ids, canonical_pose, blend_s=settings.dance.blend_s)
     places = place(
         motions,
-        music.grid_s,
+        grid.point_s,
         music.log_likelihood,
-        longest=music.longest,
-        is_beat=music.is_beat,
+        longest=grid.longest,
+        is_beat=grid.is_beat,
         accent=ends.end_accent,
         warp_weight=weights.warp_weight,
     )
-    reach = SpanReach(places, parts=music.parts)
+    reach = SpanReach(places, parts=grid.parts)
     if not reach.is_danceable:
-        raise RefusalError(_no_length(music, motions.end_s - motions.start_s))
+        raise RefusalError(_no_length(grid, motions.end_s - motions.start_s))
     pins = hmm_wishes.kept_or_refused(reach, dancer.nodes, song, asked)
-    wishes = [MotionWish(pin.first * music.parts, pin.last * music.parts, pin.nodes) for pin in pins]
-    wish_price = hmm_wishes.price(asked) / music.parts
+    wishes = [MotionWish(pin.first * grid.parts, pin.last * grid.parts, pin.nodes) for pin in pins]
+    wish_price = hmm_wishes.price(asked) / grid.parts
     wished = keep_wishes(places, wishes, price=wish_price) if wishes else places
-    crowded = crowded_cost(music.grid_s, song.duration_s, blend_s=settings.dance.blend_s)
-    lasting = _lasting(dancer, music, wished)
-    model = dancer.model
-    if warmth > 0:
-        spans, decoded = (
-            sample_spans(
-                model.log_initial,
-                model.log_transition,
-                music.log_likelihood,
-                lasting,
-                temperature=warmth,
-                rng=np.random.default_rng(seed),
-            ),
-            None,
-        )
-    else:
-        spans, decoded = _decoded(dancer, wished, ends, crowded, settings, seed)
+    crowded = crowded_cost(grid.point_s, song.duration_s, blend_s=settings.dance.blend_s)
+    lasting = log_lasting(wished, motions, grid.point_s, n_states=dancer.model.n_states)
+    decoded = None if warmth > 0 else _decoded(dancer, wished, ends, crowded, settings, seed)
+    spans = _drawn(dancer, music, lasting, warmth, seed) if decoded is None else decoded.spans(motions)
     chosen = choose_recordings(
-        motions, ends, wished, spans, decoded, crowded, is_beat=music.is_beat, grid_s=music.grid_s, settings=weights
+        motions, ends, wished, spans, decoded, crowded, is_beat=grid.is_beat, grid_s=grid.point_s, settings=weights
     )
-    edge_s = np.append(music.grid_s[spans.start], music.grid_s[spans.start[-1] + spans.length[-1]])
+    edge_s = spans.edge_s(grid.point_s)
     steps, span_of = to_choreography(
         chosen.candidates,
         chosen.found,
@@ -235,14 +203,11 @@ def by_hmm(
     span_of = span_of[kept]
     width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.dance.blend_s)
     steps = replace(steps, blend_s=width)
-    model_cost, music_cost = _model_costs(dancer.model, music, spans)
-    unkept = (
-        [w.touched_by(spans.start, spans.length) * ~w.motions[chosen.danced] for w in wishes] if asked.is_soft else []
-    )
-    wish_cost = np.sum([wish_price * n for n in unkept], axis=0) if unkept else np.zeros(len(spans.state))
+    model_cost, music_cost = span_costs(dancer.model, music.log_likelihood, spans)
+    soft = wishes if asked.is_soft else []
+    wish_cost = unkept_cost(soft, spans.start, spans.length, chosen.danced, price=wish_price)
     by_span = {**chosen.costs, "wish_cost": wish_cost, "model_cost": model_cost, "music_cost": music_cost}
-    is_first = np.append(True, np.diff(span_of) > 0)
-    columns = {name: np.where(is_first, values[span_of], 0.0) for name, values in by_span.items()}
+    columns = {name: at_first_steps(values, span_of) for name, values in by_span.items()}
     alone = best_spans(dancer.model.log_initial, dancer.model.log_transition, music.log_likelihood, lasting)[0]
     metadata = {
         "cost_of_recordings": chosen.found.total_cost,
@@ -252,48 +217,38 @@ def by_hmm(
         "clips": len(set(steps.clip_id)),
         "temperature": warmth,
         "basic_motions_danced": len(np.unique(spans.state)),
-        "as_the_model_alone_ratio": _shared(spans, alone, len(music.log_likelihood)),
+        "as_the_model_alone_ratio": shared_ratio(spans, alone, len(music.log_likelihood)),
         "music_adds": dancer.evidence.music_adds,
         "phrases": Markdown(phrase_table(steps)),
         "states": Markdown(hmm_plots.timeline(edge_s, spans.state, song.grid_s)),
     }
     spanned = zip(spans.start[span_of].tolist(), spans.length[span_of].tolist(), strict=True)
-    served = [hmm_wishes.served(pins, music.parts, start, length) for start, length in spanned]
+    served = [hmm_wishes.served(pins, grid.parts, start, length) for start, length in spanned]
     return ChosenSteps(steps, columns, metadata, served, states=spans.state[span_of])
 
 
 def listen(dancer: Dancer, percussion: pa.Table, melody: pa.Table, beat_s: Float, settings: Settings) -> HeardSong:
     """Cut the beats as finely as the dancer's motions are short, and hear what sounds in each part."""
-    lengths = dancer.motions.end_s - dancer.motions.start_s
-    parts = durations.parts_per_beat(float(np.median(np.diff(beat_s))), lengths)
-    inner_s = durations.subdivide(beat_s, parts)
-    step_s = float(np.median(np.diff(inner_s)))
-    longest = int(np.clip(np.floor(lengths.max() * durations.MOST_WARP / step_s), 1, LONGEST_SPAN))
-    grid_s = np.append(inner_s, inner_s[-1] + step_s * (1 + np.arange(longest - 1)))
-    heard = hear(percussion, melody, inner_s, symbols=settings.choreography_model.symbols)
-    return HeardSong(grid_s, parts, np.arange(len(grid_s)) % parts == 0, heard.log_likelihood(dancer.model))
+    grid = motion_grid(beat_s, dancer.motions.end_s - dancer.motions.start_s)
+    heard = hear(percussion, melody, grid.inner_s, symbols=settings.choreography_model.symbols)
+    return HeardSong(grid, heard.log_likelihood(dancer.model))
 
 
-def _lasting(dancer: Dancer, music: HeardSong, places: Places) -> Float:
-    """Log probabilities of how long basic motions last, (G, D, K); -inf where no recording may be danced."""
-    motions, n = dancer.motions, dancer.model.n_states
-    length_s = motions.end_s - motions.start_s
-    of_state = [length_s[motions.state == k] for k in range(n)]
-    found = durations.log_durations(music.grid_s, of_state, longest=music.longest)
-    there = np.array([[np.bincount(motions.state[fits], minlength=n) for fits, _ in row] for row in places.at])
-    return np.where(there > 0, np.maximum(found, LEAST_LOG), -np.inf)
+def _drawn(dancer: Dancer, music: HeardSong, lasting: Float, warmth: float, seed: int) -> Spans:
+    """Draw a dance from the model, given the music."""
+    model, rng = dancer.model, np.random.default_rng(seed)
+    log_music = music.log_likelihood
+    return sample_spans(model.log_initial, model.log_transition, log_music, lasting, temperature=warmth, rng=rng)
 
 
-def _decoded(
-    dancer: Dancer, places: Places, ends: Ends, crowded: Float, settings: Settings, seed: int
-) -> tuple[Spans, Chain]:
+def _decoded(dancer: Dancer, places: Places, ends: Ends, crowded: Float, settings: Settings, seed: int) -> Chain:
     """Find the cheapest dance in recordings."""
     model, motions, weights = dancer.model, dancer.motions, settings.hmm_path
     price = np.zeros(len(motions.state))
     if not len(dancer.evidence.n_motions):
         price = np.random.default_rng(seed).exponential(UNSURE, len(price))
     against_usual = model.log_transition + model.entropy_rate
-    chain = decode_varied(
+    return decode_varied(
         motions,
         link(motions, ends, against_usual, seam_weight=weights.seam_weight),
         places,
@@ -303,29 +258,13 @@ def _decoded(
         crowded=crowded,
         repetition_weight=weights.repetition_weight,
     )
-    return Spans(motions.state[chain.motion], chain.start, chain.length), chain
 
 
-def _model_costs(model: Model, music: HeardSong, spans: Spans) -> tuple[Float, Float]:
-    """Price each span by the model and by the music, (S,) each."""
-    before = np.append(0, spans.state[:-1])
-    log_model = np.where(spans.start == 0, model.log_initial[spans.state], model.log_transition[before, spans.state])
-    running = np.concatenate([np.zeros((1, model.n_states)), np.cumsum(music.log_likelihood, axis=0)])
-    end = np.minimum(spans.start + spans.length, len(music.log_likelihood))
-    return -log_model, running[spans.start, spans.state] - running[end, spans.state]
-
-
-def _shared(spans: Spans, other: Spans, n: int) -> float:
-    """Share of the n intervals in which both dance the same basic motion."""
-    each = [np.repeat(one.state, one.length)[:n] for one in (spans, other)]
-    return float((each[0] == each[1]).mean())
-
-
-def _no_length(music: HeardSong, length_s: Float) -> str:
-    step_s = float(np.median(np.diff(music.grid_s))) * music.parts
+def _no_length(grid: MotionGrid, length_s: Float) -> str:
     return (
-        f"no motions of known kinds cover its beats: a beat lasts {step_s:.2f} s and motions {length_s.min():.2f} to "
-        f"{length_s.max():.2f} s; add clips near that tempo, or set beats.octave in the song's brief"
+        f"no motions of known kinds cover its beats: a beat lasts {grid.beat_interval_s:.2f} s and motions "
+        f"{length_s.min():.2f} to {length_s.max():.2f} s; add clips near that tempo, or set beats.octave in the song's "
+        "brief"
     )
 
 

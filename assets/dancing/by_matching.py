@@ -1,6 +1,7 @@
 """From the matches of a song to its steps: pieces of clips, how they join, and the best sequence of them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from assets.stamps import Stored, repeatable
 from kernels.assembly.timing import blend_widths, cover
 from kernels.matching import match_sequence
 from kernels.matching.piece_joints import clip_directions, joints_of
-from kernels.types import Choreography, Float
+from kernels.types import Float
 from schemas.settings import Settings
 
 
@@ -77,17 +78,8 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         blend_s=settings.dance.blend_s,
     )
     width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.dance.blend_s)
-    steps = Choreography(
-        steps.clip_id,
-        steps.song_start_s,
-        steps.song_end_s,
-        steps.clip_start_s,
-        steps.clip_end_s,
-        steps.has_seam,
-        width,
-    )
+    steps = replace(steps, blend_s=width)
     used = [ps[c] for ps, c in zip(pieces, chosen.choice, strict=True)]
-    is_first = np.append(True, np.diff(span_of) > 0)
     by_span = {
         "transition_cost": chosen.seam_cost,
         "warp_cost": np.array([p.warp_cost for p in used]),
@@ -95,7 +87,7 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
         "intensity_cost": np.array([p.intensity_cost for p in used]),
         "repetition_cost": chosen.repetition_cost,
     }
-    costs = {name: np.where(is_first, values[span_of], 0.0) for name, values in by_span.items()}
+    costs = {name: match_sequence.at_first_steps(values, span_of) for name, values in by_span.items()}
     metadata = {
         "cost": chosen.total_cost,
         "seams": int(chosen.has_seam.sum()),

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from kernels.hmm.instances import MOST_PRICED, Motions
 from kernels.hmm.links import Links
 from kernels.hmm.places import Places, finishing
-from kernels.hmm.viterbi import InfeasibleSpansError
+from kernels.hmm.viterbi import InfeasibleSpansError, Spans
 from kernels.types import Float, Int
 
 FAR = 8.0
@@ -41,6 +41,15 @@ class Chain:
     motion: Int
     start: Int
     length: Int
+
+    def spans(self, motions: Motions) -> Spans:
+        """Tell the basic motions of the dance, and how long each lasts.
+
+        Parameters
+        ----------
+        motions : the ones that are danced, of known states
+        """
+        return Spans(motions.state[self.motion], self.start, self.length)
 
 
 def decode(

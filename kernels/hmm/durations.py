@@ -7,8 +7,10 @@ bounds, so that it ends on a beat. How probable a length is, is told by the leng
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.types import Float, Int
 from kernels.warp import EASY_WARP, HARD_WARP
@@ -26,6 +28,9 @@ of the easy bounds."""
 
 MOST_PARTS = 4
 """Parts of a beat: motions are no shorter than a sixteenth note. Chosen by hand."""
+
+LONGEST_SPAN = 8
+"""Parts of beats that a motion may last. Chosen for time, by hand."""
 
 
 def parts_per_beat(beat_interval_s: float, motion_s: Float) -> int:
@@ -49,6 +54,58 @@ def subdivide(grid_s: Float, parts: int) -> Float:
     """Cut every interval of a grid evenly into parts, (K + 1,) to (K * parts + 1,) float64, seconds."""
     even = np.arange(len(grid_s) - 1)[:, None] + np.arange(parts)[None] / parts
     return np.append(np.interp(even.reshape(-1), np.arange(len(grid_s)), grid_s), grid_s[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class MotionGrid:
+    """The points of a song between which motions are danced.
+
+    Parameters
+    ----------
+    point_s : (G + D,) float64, seconds: the G + 1 ends of intervals that motions take, and D - 1 beyond
+    parts : int, >= 1, intervals to a beat
+    longest : int, D >= 1, most intervals that a motion takes
+    """
+
+    point_s: Float
+    parts: int
+    longest: int
+
+    @property
+    def inner_s(self) -> Float:
+        """Ends of the intervals within the song, (G + 1,) float64, seconds."""
+        return self.point_s[: len(self.point_s) - self.longest + 1]
+
+    @property
+    def is_beat(self) -> NDArray[np.bool_]:
+        """Whether each point is a beat, (G + D,) bool."""
+        return np.asarray(np.arange(len(self.point_s)) % self.parts == 0)
+
+    @property
+    def beat_interval_s(self) -> float:
+        """Median length of an interval times the parts of a beat, seconds."""
+        return float(np.median(np.diff(self.point_s))) * self.parts
+
+
+def motion_grid(beat_s: Float, motion_s: Float) -> MotionGrid:
+    """Cut the beats of a song as finely as motions are short.
+
+    Parameters
+    ----------
+    beat_s : (K + 1,) float, seconds, increasing, K >= 1
+    motion_s : (n,) float, seconds, > 0, lengths of motions, n >= 1
+
+    Returns
+    -------
+    MotionGrid
+        Of the parts of :func:`parts_per_beat`. D is what the longest motion takes of parts of median length at its
+        slowest, 1 to :data:`LONGEST_SPAN`; beyond the song the grid goes on in steps of that length.
+    """
+    parts = parts_per_beat(float(np.median(np.diff(beat_s))), motion_s)
+    inner_s = subdivide(beat_s, parts)
+    step_s = float(np.median(np.diff(inner_s)))
+    longest = int(np.clip(np.floor(motion_s.max() * MOST_WARP / step_s), 1, LONGEST_SPAN))
+    return MotionGrid(np.append(inner_s, inner_s[-1] + step_s * (1 + np.arange(longest - 1))), parts, longest)
 
 
 def log_durations(grid_s: Float, motion_s: Sequence[Float], *, longest: int) -> Float:

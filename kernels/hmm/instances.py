@@ -56,6 +56,21 @@ class Motions:
         return np.where(np.append(goes_on, False), np.arange(len(self.state)) + 1, -1)
 
 
+def motions_of_clips(state: Sequence[Int], start_s: Sequence[Float], end_s: Sequence[Float]) -> Motions:
+    """Put the motions of clips in one row.
+
+    Parameters
+    ----------
+    state, start_s, end_s : (n,) int64 and float, of each of C >= 1 clips; seconds of the clip
+
+    Returns
+    -------
+    Motions
+    """
+    of = np.repeat(np.arange(len(state)), [len(each) for each in state])
+    return Motions(of, np.concatenate(state), np.concatenate(start_s), np.concatenate(end_s))
+
+
 def shortlist(
     motions: Motions,
     fits: Sequence[Int],

@@ -172,6 +172,24 @@ def keep_wishes(places: Places, wishes: Sequence[MotionWish], *, price: float = 
     return Places(at)
 
 
+def unkept_cost(wishes: Sequence[MotionWish], start: Int, length: Int, motion: Int, *, price: float) -> Float:
+    """Price what a dance shows in place of what is wished for.
+
+    Parameters
+    ----------
+    wishes : in any order; where they overlap, each counts
+    start, length : (S,) int64, intervals of its spans
+    motion : (S,) int64, danced in each
+    price : float, >= 0, of an interval
+
+    Returns
+    -------
+    (S,) float64, >= 0; 0 without wishes
+    """
+    unkept = [wish.touched_by(start, length) * ~wish.motions[motion] for wish in wishes]
+    return np.asarray(np.sum([price * n for n in unkept], axis=0) if unkept else np.zeros(len(start)), np.float64)
+
+
 def finishing(places: Places) -> Places:
     """Take out what nothing could follow to the end of the grid.
 

@@ -99,6 +99,15 @@ class Spans:
     start: Int
     length: Int
 
+    def edge_s(self, grid_s: Float) -> Float:
+        """Time where each span starts and, last, where the last one ends, (S + 1,) float64, seconds.
+
+        Parameters
+        ----------
+        grid_s : (P,) float, seconds, of the points between intervals, as far as the last span reaches; S >= 1
+        """
+        return np.append(grid_s[self.start], grid_s[self.start[-1] + self.length[-1]])
+
 
 def best_spans(
     log_initial: Float, log_transition: Float, log_likelihood: Float, log_duration: Float

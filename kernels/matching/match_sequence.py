@@ -325,3 +325,19 @@ def to_choreography(
         tuple(clips), song_s[0], song_s[1], in_clip_s[0], in_clip_s[1], seam, np.where(seam, blend_s, 0.0)
     )
     return steps, np.concatenate(of)
+
+
+def at_first_steps(value: Float, span_of: Int) -> Float:
+    """Give what a span costs to the first of its steps.
+
+    Parameters
+    ----------
+    value : (S,) float, of each span
+    span_of : (S',) int64, ascending, S' >= 1; span of each step
+
+    Returns
+    -------
+    (S',) float64; 0 for the other steps
+    """
+    is_first = np.append(True, np.diff(span_of) > 0)
+    return np.where(is_first, value[span_of], 0.0)

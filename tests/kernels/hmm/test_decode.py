@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels.hmm import decode as decoding
-from kernels.hmm.decode import FAR, decode, decode_varied
+from kernels.hmm.decode import FAR, Chain, decode, decode_varied
 from kernels.hmm.instances import Motions
 from kernels.hmm.links import Links, link
 from kernels.hmm.places import Places, place
@@ -144,3 +144,8 @@ def test_a_motion_shown_very_often_costs_no_more(monkeypatch):
 
     assert shown(0.9)[:5] == [0, 0, 0, 0, 1]
     assert shown(1.1) == [0] * n  # four showings are the most that is priced
+
+
+def test_a_dance_in_recordings_is_one_in_basic_motions(some_motions):
+    spans = Chain(np.array([1, 2, 5]), np.array([0, 2, 3]), np.array([2, 1, 2])).spans(some_motions())
+    assert (spans.state.tolist(), spans.start.tolist(), spans.length.tolist()) == ([1, 0, 1], [0, 2, 3], [2, 1, 2])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.hmm.durations import HARD_LOG, WIDTH, log_durations, parts_per_beat, subdivide
+from kernels.hmm.durations import HARD_LOG, LONGEST_SPAN, WIDTH, log_durations, motion_grid, parts_per_beat, subdivide
 
 
 def test_a_motion_of_two_beats_takes_two():
@@ -62,3 +62,28 @@ def test_over_all_lengths_probabilities_sum_to_no_more_than_one():
 def test_a_beat_is_cut_by_the_median_length():
     assert parts_per_beat(1.0, np.array([0.5, 0.5, 9.0])) == 2
     assert parts_per_beat(1.0, np.array([0.4, 0.6])) == 2
+
+
+def test_a_grid_is_cut_by_usual_motions_and_goes_on_for_the_longest():
+    """Beats of 1 s, motions of half a second: two parts; one of 0.9 s takes two at its slowest, 1.125 s."""
+    grid = motion_grid(np.arange(4.0), np.array([0.5, 0.5, 0.9]))
+    assert (grid.parts, grid.longest) == (2, 2)
+    np.testing.assert_allclose(grid.point_s, 0.5 * np.arange(8))
+    np.testing.assert_allclose(grid.inner_s, 0.5 * np.arange(7))
+    assert grid.is_beat.tolist() == [True, False] * 4
+    assert grid.beat_interval_s == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("longest_s", "longest"), [(0.3, 1), (0.79, 1), (0.81, 2), (1.59, 3), (1.61, 4), (99.0, 8)])
+def test_the_longest_motion_says_how_far_a_span_goes(longest_s, longest):
+    assert LONGEST_SPAN == 8
+    lengths = np.array([0.5, 0.5, 0.5, longest_s])
+    grid = motion_grid(0.5 * np.arange(4), lengths)
+    assert (grid.parts, grid.longest, len(grid.point_s)) == (1, longest, 3 + longest)
+
+
+def test_beyond_the_song_a_grid_goes_on_at_its_usual_pace():
+    grid = motion_grid(np.array([0.0, 1.0, 2.0, 2.5]), np.array([1.0, 2.5]))
+    assert grid.longest == 3
+    np.testing.assert_allclose(grid.point_s, [0, 1, 2, 2.5, 3.5, 4.5])
+    np.testing.assert_allclose(grid.inner_s, [0, 1, 2, 2.5])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kernels.hmm.instances import HARD_COST, PACE, Motions, choose, shortlist
+from kernels.hmm.instances import HARD_COST, PACE, Motions, choose, motions_of_clips, shortlist
 from kernels.warp import warp_cost
 
 
@@ -155,3 +155,15 @@ def test_prices_rise_until_a_sequence_leaves_what_it_shows_again():
     assert choice.tolist() == [1, 1, 0, 0]
     assert again.sum() == 0
     assert total == pytest.approx(1.2)
+
+
+def test_motions_of_clips_stand_clip_after_clip():
+    whole = motions()
+    each = [[column[whole.clip_index == c] for c in (0, 1)] for column in (whole.state, whole.start_s, whole.end_s)]
+    each[0].insert(1, np.zeros(0, np.int64))
+    each[1].insert(1, np.zeros(0))
+    each[2].insert(1, np.zeros(0))
+    found = motions_of_clips(*each)
+    assert found.clip_index.tolist() == [0] * 4 + [2] * 4
+    for name in ("state", "start_s", "end_s"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))

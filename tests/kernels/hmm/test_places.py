@@ -14,6 +14,7 @@ from kernels.hmm.places import (
     keep_wishes,
     missed_beats,
     place,
+    unkept_cost,
 )
 from kernels.hmm.viterbi import InfeasibleSpansError
 from kernels.warp import warp_cost
@@ -91,3 +92,11 @@ def test_a_wish_counts_the_intervals_that_a_motion_shares_with_it():
     wish = MotionWish(2, 5, np.ones(1, bool))
     found = wish.touched_by(np.array([0, 0, 1, 2, 4, 5]), np.array([2, 3, 9, 1, 4, 1]))
     assert found.tolist() == [0, 1, 3, 1, 1, 0]
+
+
+def test_what_is_danced_in_place_of_a_wish_costs_by_the_interval():
+    even, low = np.arange(4) % 2 == 0, np.arange(4) < 2
+    start, length, motion = np.array([0, 2, 5]), np.array([2, 3, 1]), np.array([1, 3, 3])
+    wishes = [MotionWish(1, 4, even), MotionWish(0, 3, low)]
+    np.testing.assert_array_equal(unkept_cost(wishes, start, length, motion, price=0.5), [0.5, 1.0 + 0.5, 0.0])
+    np.testing.assert_array_equal(unkept_cost([], start, length, motion, price=0.5), np.zeros(3))

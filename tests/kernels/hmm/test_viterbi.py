@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from kernels.hmm.viterbi import InfeasibleSpansError, best_spans, log_probability, sample_spans, viterbi
+from kernels.hmm.viterbi import InfeasibleSpansError, Spans, best_spans, log_probability, sample_spans, viterbi
 
 
 def random_model(n, n_steps, seed):
@@ -157,3 +157,8 @@ def test_one_state_is_a_model():
     assert state.tolist() == [0, 0]
     assert log_p == pytest.approx(np.log(0.125))
     assert log_probability(np.zeros(1), np.zeros((1, 1)), seen) == pytest.approx(np.log(0.125))
+
+
+def test_spans_start_and_end_on_the_grid_and_beyond_it():
+    spans = Spans(np.array([0, 1]), np.array([0, 2]), np.array([2, 3]))
+    np.testing.assert_array_equal(spans.edge_s(np.array([0.0, 0.4, 1.0, 1.5, 2.1, 2.6])), [0.0, 1.0, 2.6])

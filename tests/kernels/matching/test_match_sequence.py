@@ -5,7 +5,16 @@ import itertools
 import numpy as np
 import pytest
 
-from kernels.matching.match_sequence import Candidates, Joint, choose, continues, overlaps, to_choreography, viterbi
+from kernels.matching.match_sequence import (
+    Candidates,
+    Joint,
+    at_first_steps,
+    choose,
+    continues,
+    overlaps,
+    to_choreography,
+    viterbi,
+)
 
 
 def candidates(costs, *, clip=None, start=None, length=2.0):
@@ -267,3 +276,8 @@ def test_errors():
         choose([candidates([])], [])
     with pytest.raises(ValueError, match="joints"):
         choose([candidates([1])], [joint([[1]])])
+
+
+def test_the_first_step_of_a_span_pays_for_it():
+    np.testing.assert_array_equal(at_first_steps(np.array([1.0, 2.0, 3.0]), np.array([0, 0, 2, 2, 2])), [1, 0, 3, 0, 0])
+    np.testing.assert_array_equal(at_first_steps(np.array([1.0, 2.0]), np.array([1])), [2])
