@@ -37,22 +37,22 @@ def heard():
 
 def test_the_grid_goes_on_beyond_the_song_at_the_same_step(heard):
     found = heard(2.0 + 0.5 * np.arange(5), 0.5, 1.0)
-    assert found.parts == 1
-    assert found.longest == 2  # a second and a quarter are two and a half beats
-    np.testing.assert_allclose(found.grid_s, 2.0 + 0.5 * np.arange(6))
+    assert found.grid.parts == 1
+    assert found.grid.longest == 2  # a second and a quarter are two and a half beats
+    np.testing.assert_allclose(found.grid.point_s, 2.0 + 0.5 * np.arange(6))
     assert found.log_likelihood.shape == (4, 2)
 
 
 def test_beats_are_cut_where_motions_are_shorter_and_each_beat_is_one(heard):
     found = heard(np.arange(4.0), 0.5, 0.5, 0.9)
-    assert (found.parts, found.longest) == (2, 2)
-    np.testing.assert_allclose(found.grid_s, 0.5 * np.arange(8))
-    assert found.is_beat.tolist() == [True, False] * 4
+    assert (found.grid.parts, found.grid.longest) == (2, 2)
+    np.testing.assert_allclose(found.grid.point_s, 0.5 * np.arange(8))
+    assert found.grid.is_beat.tolist() == [True, False] * 4
 
 
 def test_a_motion_lasts_one_interval_at_least_and_eight_at_most(heard):
-    assert heard(np.arange(0, 10.0), 0.1).longest == 1
-    assert heard(np.arange(0, 10.0), 0.9, 0.9, 60.0).longest == 8
+    assert heard(np.arange(0, 10.0), 0.1).grid.longest == 1
+    assert heard(np.arange(0, 10.0), 0.9, 0.9, 60.0).grid.longest == 8
 
 
 def motions_of(n):
