@@ -1,6 +1,6 @@
 """The motion graph: which beat of which clip may follow which."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import dagster as dg
@@ -24,7 +24,7 @@ from kernels.graph.beat_features import BeatFeatures, beat_features
 from kernels.graph.distance import PairDistance
 from kernels.graph.nodes import beat_nodes
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
-from kernels.graph.shortlist import nearest_of
+from kernels.graph.shortlist import Work, nearest_of
 from kernels.graph.transitions import Transitions, blend_margin_s, connect
 from kernels.motion.velocity import accents, jerk_around, speed_between
 from kernels.skeleton.canonical import JOINTS
@@ -70,7 +70,7 @@ def motion_graph(
     earlier = recall(graph_memory, rules)
     known = earlier.clips if earlier else {}
     labels: dict[str, str] = {}
-    beats = []
+    beats: list[Beats] = []
     for key in motion_beat.keys:
         labels |= {row["clip_id"]: row["label"] for row in pack.read_rows(clip.read(key)).to_pylist()}
         beats += _session(key, labels, canonical_pose, motion_beat, settings, known)
@@ -88,27 +88,18 @@ def motion_graph(
     keep(graph_memory, rules, beats, features, listed)
     pairs = nearest_of(listed, nodes, n_nearest=settings.neighbours)
     found = connect(nodes, pairs, threshold=settings.threshold or None)
-    seen = {
-        name: np.concatenate([*(getattr(b, name) for b in beats), np.zeros(0)])
-        for name in ("accent", "peak_jerk", "usual_jerk", "speed")
-    }
-    graph = replace(found.graph, **seen)
+    graph = _as_moved(found.graph, beats)
     losses = {name: prune(graph) for name, prune in PRUNE.items()}
-    kept = losses[settings.prune]
-    index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
     ids = [b.clip_id for b in beats]
-    node = from_motion_graph_node(graph, ids, index, [labels[source_clip(clip)] for clip in ids], kept.is_kept)
-    edge = from_motion_graph_edge(graph, ids, found.distance)
-    metadata = _metadata(found, losses, settings.prune) | {
+    node = _nodes(graph, beats, labels, losses[settings.prune])
+    metadata = {
+        **_metadata(found, losses, settings.prune),
+        **_work(work, beats, known),
         "device": getattr(pair_distance, "name", "reference"),
-        "computed_clips": sum(b.version != (known[b.clip_id].version if b.clip_id in known else "") for b in beats),
-        "computed_rows": work.computed_nodes,
-        "rows_searched_again": work.refilled_rows,
-        "computed_distances": work.distances,
         "labels": dg.MetadataValue.md(_by_label(node)),
     }
     yield dg.Output(Part("", node, metadata=metadata), MOTION_GRAPH_NODE.name)
-    yield dg.Output(Part("", edge), MOTION_GRAPH_EDGE.name)
+    yield dg.Output(Part("", from_motion_graph_edge(graph, ids, found.distance)), MOTION_GRAPH_EDGE.name)
     yield dg.AssetCheckResult(
         check_name="goes_on",
         asset_key=MOTION_GRAPH_NODE.name,
@@ -116,6 +107,28 @@ def motion_graph(
         severity=dg.AssetCheckSeverity.WARN,
         metadata={"beats": len(nodes), "threshold_used": found.threshold_used},
     )
+
+
+def _as_moved(graph: MotionGraph, beats: Sequence[Beats]) -> MotionGraph:
+    """Give the nodes of a graph what was measured of their beats."""
+    names = ("accent", "peak_jerk", "usual_jerk", "speed")
+    return replace(graph, **{n: np.concatenate([*(getattr(b, n) for b in beats), np.zeros(0)]) for n in names})
+
+
+def _nodes(graph: MotionGraph, beats: Sequence[Beats], labels: Mapping[str, str], kept: Pruned) -> pa.Table:
+    index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
+    ids = [b.clip_id for b in beats]
+    return from_motion_graph_node(graph, ids, index, [labels[source_clip(clip)] for clip in ids], kept.is_kept)
+
+
+def _work(work: Work, beats: Sequence[Beats], known: Mapping[str, Beats]) -> dict[str, object]:
+    """Count what was computed, and not remembered."""
+    return {
+        "computed_clips": sum(b.version != (known[b.clip_id].version if b.clip_id in known else "") for b in beats),
+        "computed_rows": work.computed_nodes,
+        "rows_searched_again": work.refilled_rows,
+        "computed_distances": work.distances,
+    }
 
 
 def _session(

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import dagster as dg
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
 
 from assets.declare import table_asset
@@ -71,26 +72,21 @@ def match(
     rhythms, left_out = catalogue(motion_feature)
     clip_ids = sorted(rhythms)
     index = matcher.index([rhythms[clip] for clip in clip_ids])
+    k = studio.settings().matching.candidates
+    facts = {
+        "clips": len(clip_ids),
+        "device": getattr(matcher, "name", "reference"),
+        "clips_left_out": "; ".join(left_out) or "none",
+    }
     made, poor = [], []
     for key in keys:
-        segments = matching_tables.to_music_segment(music_segment.read(key))
-        rhythm = np.asarray(music_feature.read(key)["rhythm"].to_numpy(), np.float32)
-        parts = matching_tables.segment_rhythms(segments, rhythm)
-        k = studio.settings().matching.candidates
+        segments, parts = segmented(music_segment.read(key), music_feature.read(key))
         found = matcher.matches(parts, index, k=k) if parts and clip_ids else [[] for _ in parts]
         table = matching_tables.from_matches(key, found, clip_ids)
         stored = matching_tables.to_matches(table, len(parts))
-        lacking = [i for i, m in enumerate(stored) if not len(m.score) or (parts[i].any() and not m.score[0] > 0)]
-        poor += [f"{key}: segment {i}" for i in lacking]
-        metadata = {
-            "clips": len(clip_ids),
-            "segments": len(parts),
-            "device": getattr(matcher, "name", "reference"),
-            "clips_left_out": "; ".join(left_out) or "none",
-            "matches": dg.MetadataValue.md(matching_plots.segment_matches(segments, stored)),
-            "curves": dg.MetadataValue.md(_curves(segments, parts, stored, rhythms)),
-        }
-        made.append(Part(key, table, metadata=metadata))
+        poor += [f"{key}: segment {i}" for i in without_match(parts, stored)]
+        pictures = _pictures(segments, parts, stored, rhythms)
+        made.append(Part(key, table, metadata={**facts, "segments": len(parts), **pictures}))
         progress.step()
     yield dg.Output(Parts(made))
     yield dg.AssetCheckResult(
@@ -100,6 +96,28 @@ def match(
         severity=dg.AssetCheckSeverity.WARN,
         metadata={"without_match": ", ".join(poor[:40]) or "none", "clips_left_out": ", ".join(left_out) or "none"},
     )
+
+
+def segmented(music_segment: pa.Table, music_feature: pa.Table) -> tuple[Segments, list[Rhythm]]:
+    """Read the segments of a song, and the rhythm of each.
+
+    Parameters
+    ----------
+    music_segment, music_feature : tables of these names, the rows of one song
+    """
+    segments = matching_tables.to_music_segment(music_segment)
+    return segments, matching_tables.segment_rhythms(segments, matching_tables.to_rhythm(music_feature))
+
+
+def without_match(parts: Sequence[Rhythm], stored: Sequence[StoredMatches]) -> list[int]:
+    """List the segments that no clip fits: without a match, or where something sounds and the best is no better than 0.
+
+    Parameters
+    ----------
+    parts : (L,) float32, rhythm of each segment
+    stored : StoredMatches of each segment, the best first
+    """
+    return [i for i, m in enumerate(stored) if not len(m.score) or (parts[i].any() and not m.score[0] > 0)]
 
 
 def catalogue(motion_feature: Stored) -> tuple[dict[str, Rhythm], list[str]]:
@@ -123,6 +141,15 @@ def catalogue(motion_feature: Stored) -> tuple[dict[str, Rhythm], list[str]]:
             else:
                 left_out.append(f"{clip}: its rhythm is not finite")
     return rhythms, left_out
+
+
+def _pictures(
+    segments: Segments, parts: Sequence[Rhythm], stored: Sequence[StoredMatches], rhythms: dict[str, Rhythm]
+) -> dict[str, dg.MetadataValue[Any]]:
+    return {
+        "matches": dg.MetadataValue.md(matching_plots.segment_matches(segments, stored)),
+        "curves": dg.MetadataValue.md(_curves(segments, parts, stored, rhythms)),
+    }
 
 
 def _curves(

@@ -77,32 +77,17 @@ def motion_beat(
     """Find the beats of every clip by windowed principal components."""
     settings = studio.settings().motion_beat
     code = version_of(code_version(context, MOTION_BEAT.name), repr(settings))
-    how = beat_settings(settings)
 
     def session(key: str) -> Part:
         poses = pack.by_clip(canonical_pose.read(key))
 
         def one(clip_id: str) -> pa.Table:
-            if clip_id not in poses:
-                return MOTION_BEAT.empty()
-            moved = to_canonical_pose(poses[clip_id])
-            heading = rotation.heading_rad(moved.rotation_wxyz[:, 0]) if settings.frame == "body" else None
-            first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
-            beats = motion_beats(
-                moved.position_xyz_m[first : last + 1],
-                moved.frame_rate_hz,
-                heading_rad=heading[first : last + 1] if heading is not None else None,
-                settings=how,
-            )
-            return from_motion_beat(clip_id, beats, moved.frame_rate_hz, first_frame=first)
+            return beats_of(poses[clip_id], settings) if clip_id in poses else MOTION_BEAT.empty()
 
-        part = per_clip(
-            MOTION_BEAT, key, clip_versions(canonical_pose, key, code), one, earlier=earlier, progress=progress
-        )
-        picture = session_beats(part.table, clip.read(key))
-        return Part(
-            part.key, part.table, clips=part.clips, metadata={**part.metadata, "beats": dg.MetadataValue.md(picture)}
-        )
+        made_from = clip_versions(canonical_pose, key, code)
+        part = per_clip(MOTION_BEAT, key, made_from, one, earlier=earlier, progress=progress)
+        picture = dg.MetadataValue.md(session_beats(part.table, clip.read(key)))
+        return replace(part, metadata={**part.metadata, "beats": picture})
 
     return Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose))
 
@@ -165,6 +150,32 @@ def key_pose(
         return replace(part, metadata={**part.metadata, "motions": part.table.num_rows, "of_known_kind": known})
 
     return Parts(session(key) for key in _begun(progress, "key poses", canonical_pose))
+
+
+def beats_of(rows: pa.Table, settings: MotionBeatSettings) -> pa.Table:
+    """Find the beats of one clip in the frames of it that are usable.
+
+    Parameters
+    ----------
+    rows : table ``canonical_pose``, the rows of one clip, at least one
+    settings : the ``[motion_beat]`` section
+
+    Returns
+    -------
+    table ``motion_beat``, a row a beat
+
+    Raises
+    ------
+    ValueError
+        As :func:`beat_settings`.
+    """
+    moved = to_canonical_pose(rows)
+    first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
+    kept = slice(first, last + 1)
+    heading = rotation.heading_rad(moved.rotation_wxyz[:, 0])[kept] if settings.frame == "body" else None
+    position, how = moved.position_xyz_m[kept], beat_settings(settings)
+    beats = motion_beats(position, moved.frame_rate_hz, heading_rad=heading, settings=how)
+    return from_motion_beat(moved.clip_id, beats, moved.frame_rate_hz, first_frame=first)
 
 
 def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:

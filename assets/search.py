@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import dagster as dg
 import numpy as np
@@ -28,6 +28,9 @@ from kernels.search.windows import windows
 from kernels.types import Float
 from schemas.search import LABEL_PROPOSAL, MOTION_EMBEDDING, MOTION_ENCODER, MOTION_INDEX
 from schemas.settings import SearchSettings
+
+if TYPE_CHECKING:  # JAX: loaded where something is trained, and nowhere else
+    from kernels.search.encoder_fit import Fitted
 
 _MOST_WINDOWS_A_CLIP = 4
 """Chosen by hand."""
@@ -77,16 +80,27 @@ def motion_encoder(
             how=Training(steps=settings.training_steps, seed=settings.seed, has_travel=settings.has_travel),
             progress=progress.step,
         )
-    labels = sorted({e.label for e in examples} - {""})
+    made_from = {key: canonical_pose.stamp(key).content for key in canonical_pose.keys}
+    provenance = {**_learnt_from(examples), "seed": settings.seed, "made_from": made_from, **_training(fitted)}
+    table = search_tables.from_encoder(fitted.encoder.arrays(), json.dumps(provenance, sort_keys=True))
+    shown: dict[str, dg.MetadataValue[Any]] = {"provenance": dg.MetadataValue.json(provenance)}
+    if fitted.confusion:
+        shown["confusion_of_held_out"] = dg.MetadataValue.md(search_plots.confusion(fitted.confusion))
+    return Part("", table, metadata=shown)
+
+
+def _learnt_from(examples: Sequence[_Example]) -> dict[str, object]:
+    """Count what an encoder learnt from, for its provenance."""
+    clips, labels = {e.take for e in examples}, {e.label for e in examples} - {""}
+    return {"windows": len(examples), "clips": len(clips), "labels": sorted(labels)}
+
+
+def _training(fitted: "Fitted") -> dict[str, object]:
+    """Say how an encoder was trained, with what, and how well it does on what was held out."""
     said = fitted.validation
-    provenance = {
+    return {
         "kind": fitted.kind,
         "steps": fitted.steps,
-        "seed": settings.seed,
-        "windows": len(examples),
-        "clips": len({e.take for e in examples}),
-        "labels": labels,
-        "made_from": {key: canonical_pose.stamp(key).content for key in canonical_pose.keys},
         "libraries": {name: version(name) for name in ("jax", "jaxlib", "equinox", "optax", "numpy")},
         "validation": {
             "first_ratio": said.first_ratio,
@@ -96,11 +110,6 @@ def motion_encoder(
         if said
         else None,
     }
-    table = search_tables.from_encoder(fitted.encoder.arrays(), json.dumps(provenance, sort_keys=True))
-    shown: dict[str, dg.MetadataValue[Any]] = {"provenance": dg.MetadataValue.json(provenance)}
-    if fitted.confusion:
-        shown["confusion_of_held_out"] = dg.MetadataValue.md(search_plots.confusion(fitted.confusion))
-    return Part("", table, metadata=shown)
 
 
 def _examples(clip: Stored, canonical_pose: Stored, settings: SearchSettings) -> list[_Example]:

@@ -91,7 +91,6 @@ TESTED_ELSEWHERE = {
     "assets/dance.py",
     "assets/declare.py",
     "assets/graph.py",
-    "assets/matching.py",
     "assets/hmm.py",
     "assets/dancing/by_hmm.py",
     "assets/dancing/recordings.py",

@@ -73,7 +73,7 @@ def load_matches(
     music = music_feature.read(song_id)
     return LoadedMatches(
         segments,
-        np.asarray(pack.to_numbers(music["rhythm"]), np.float32),
+        matching_tables.to_rhythm(music),
         pack.to_numbers(music["intensity"]).astype(np.float64),
         matches,
         clips,

@@ -200,6 +200,20 @@ def to_music_segment(rows: pa.Table) -> Segments:
     )
 
 
+def to_rhythm(table: pa.Table) -> Rhythm:
+    """Read the rhythm of a song.
+
+    Parameters
+    ----------
+    table : table ``music_feature``, the rows of one song
+
+    Returns
+    -------
+    (F,) float32
+    """
+    return np.asarray(to_numbers(table["rhythm"]), np.float32)
+
+
 def segment_rhythms(segments: Segments, rhythm: Rhythm) -> list[Rhythm]:
     """Cut a song's rhythm into its segments.
 

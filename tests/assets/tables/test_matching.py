@@ -40,6 +40,8 @@ def test_a_song_and_its_segments_come_back():
     values = np.arange(421.0)
     song = mt.from_music_feature("waltz", MusicFeatures(values, values))
     assert song.schema.equals(MUSIC_FEATURE.arrow)
+    assert mt.to_rhythm(song).dtype == np.float32
+    np.testing.assert_array_equal(mt.to_rhythm(song), values)
     table = mt.from_music_segment("waltz", SEGMENTS)
     assert table.schema.equals(MUSIC_SEGMENT.arrow)
     again = mt.to_music_segment(table)
