@@ -27,12 +27,11 @@ from assets.sources.sources import Studio
 from assets.stamps import Stored
 from assets.tables.graph import to_motion_graph
 from assets.tables.music import to_music_beat
-from kernels.graph.moment_candidates import Proposals
+from kernels.graph.moment_candidates import Proposals, price_groups
 from kernels.graph.path import STEPS, first_beats, more_than_any
 from kernels.graph.pin_conflicts import admitted
 from kernels.graph.program import PathProgram
 from kernels.graph.structure import structure_pins
-from kernels.types import Float, Int
 from schemas.keys import is_mirrored
 from schemas.pins import PinWish, parse_pin
 from schemas.settings import PathSettings, Settings
@@ -162,7 +161,7 @@ def propose(
         every = getattr(known.nodes, "clip_id" if kind == "clip" else kind)
         names, first, group = np.unique(every, return_index=True, return_inverse=True)
         is_named = (names != "") & (np.bincount(group, known.is_allowed, minlength=len(names)) > 0)
-        prices = _price(solved, place, group, len(names), is_named)
+        prices = price_groups([p for p, _ in solved], place.first, place.last, group, is_named, most=MOST_PROGRAMS)
         rows = [
             {
                 kind: str(names[i]),
@@ -210,51 +209,6 @@ def _of_clip(known: GraphCatalogue, place: Asked, node: int, best: int) -> Mappi
 def _of_many(known: GraphCatalogue, nodes: NDArray[np.bool_], best: int) -> Mapping[str, Any]:
     cheapest = {} if best < 0 else {"cheapest_clip": str(known.nodes.clip_id[best])}
     return {"clip_count": len(np.unique(known.nodes.clip_id[nodes])), **cheapest}
-
-
-@dataclass(frozen=True, eq=False)
-class _Prices:
-    """Of each name: cost, infinite where out of reach; first node, -1 where not known; whether it was not looked at."""
-
-    cost: Float
-    node: Int
-    is_left: NDArray[np.bool_]
-
-
-def _price(
-    solved: list[tuple[Proposals, float]], place: Asked, group: Int, n: int, is_named: NDArray[np.bool_]
-) -> _Prices:
-    """Price dancing the nodes of each group at a place, by the first of the solved songs that can.
-
-    Over several intervals each group takes a program of its own; the cheapest step in each interval is a bound that
-    says which are worth it.
-    """
-    prices = _Prices(np.full(n, np.inf), np.full(n, -1), np.zeros(n, bool))
-    for proposals, _ in solved:
-        todo = is_named & np.isinf(prices.cost)
-        bound = np.zeros(n)
-        for interval in range(place.first, place.last):
-            least, node = _least(proposals.through(interval), group, n)
-            bound = np.maximum(bound, least)
-        if place.last == place.first + 1:
-            prices.cost[todo], prices.node[todo] = bound[todo], node[todo]
-            continue
-        likely = np.flatnonzero(todo & np.isfinite(bound))
-        likely = likely[np.argsort(bound[likely], kind="stable")]
-        for i in likely[:MOST_PROGRAMS].tolist():
-            prices.cost[i] = proposals.within(place.first, place.last, group == i)
-        prices.is_left[likely[MOST_PROGRAMS:]] = True
-    prices.is_left[np.isfinite(prices.cost)] = False
-    return prices
-
-
-def _least(through: Float, group: Int, n: int) -> tuple[Float, Int]:
-    """Least cost of each group, (n,), and its first node, -1 for none."""
-    order = np.lexsort((np.arange(len(group)), through, group))
-    least, node = np.full(n, np.inf), np.full(n, -1)
-    of, first = np.unique(group[order], return_index=True)
-    least[of], node[of] = through[order[first]], order[first]
-    return least, node
 
 
 def _solved(

@@ -8,6 +8,7 @@ dance that takes the step there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,3 +147,83 @@ class Proposals:
                 for stayed, after in enumerate(program.stayed_after(kind)):
                     here[after, ends] = np.minimum(here[after, ends], total[stayed])
         return self._ready[beat]
+
+
+@dataclass(frozen=True, eq=False)
+class GroupPrices:
+    """What it costs to dance nodes of each of G groups, (G,) each.
+
+    Parameters
+    ----------
+    cost : float64, infinite where out of reach, or where not looked at
+    node : int64, first node of the cheapest dance; -1 where not known
+    is_left : bool, whether it was not looked at
+    """
+
+    cost: Float
+    node: Int
+    is_left: Mask
+
+
+def price_groups(
+    solved: Sequence[Proposals], first: int, last: int, group: Int, is_wanted: Mask, *, most: int
+) -> GroupPrices:
+    """Price dancing the nodes of each group in a stretch, by the first of some solved songs that can.
+
+    Parameters
+    ----------
+    solved : Proposals of N nodes, the best first
+    first, last : int, music intervals first <= k < last
+    group : (N,) int64, 0 to G - 1
+    is_wanted : (G,) bool
+    most : int, >= 0
+        Groups that each solved song prices over several intervals; the rest are left.
+
+    Returns
+    -------
+    GroupPrices
+
+    Notes
+    -----
+    Over several intervals each group takes a program of its own. The cheapest step in each interval is a bound that
+    says which are worth it: those of the least bound, of equal ones the first.
+    """
+    n = len(is_wanted)
+    prices = GroupPrices(np.full(n, np.inf), np.full(n, -1), np.zeros(n, bool))
+    for proposals in solved:
+        todo = is_wanted & np.isinf(prices.cost)
+        bound = np.zeros(n)
+        for interval in range(first, last):
+            least, node = least_of_groups(proposals.through(interval), group, n)
+            bound = np.maximum(bound, least)
+        if last == first + 1:
+            prices.cost[todo], prices.node[todo] = bound[todo], node[todo]
+            continue
+        likely = np.flatnonzero(todo & np.isfinite(bound))
+        likely = likely[np.argsort(bound[likely], kind="stable")]
+        for i in likely[:most].tolist():
+            prices.cost[i] = proposals.within(first, last, group == i)
+        prices.is_left[likely[most:]] = True
+    prices.is_left[np.isfinite(prices.cost)] = False
+    return prices
+
+
+def least_of_groups(value: Float, group: Int, n_groups: int) -> tuple[Float, Int]:
+    """Find the least value of each group.
+
+    Parameters
+    ----------
+    value : (N,) float, not NaN
+    group : (N,) int64, 0 to G - 1
+    n_groups : int, G
+
+    Returns
+    -------
+    least : (G,) float64, infinite for a group without values
+    index : (G,) int64, the first that has it; -1 for none
+    """
+    order = np.lexsort((np.arange(len(group)), value, group))
+    least, index = np.full(n_groups, np.inf), np.full(n_groups, -1)
+    of, first = np.unique(group[order], return_index=True)
+    least[of], index[of] = value[order[first]], order[first]
+    return least, index

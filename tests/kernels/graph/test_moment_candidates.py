@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels.graph.costs import PathCosts
-from kernels.graph.moment_candidates import Proposals
+from kernels.graph.moment_candidates import Proposals, least_of_groups, price_groups
 from kernels.graph.path import STEPS, InfeasiblePathError, find_path
 from kernels.graph.pin_conflicts import Pin, admitted
 from kernels.graph.program import PathProgram
@@ -99,3 +99,62 @@ def test_what_is_not_in_the_song(make_graph):
     nothing = proposals_of(make_graph([]), beats, np.zeros(0, int))
     assert np.isinf(nothing.best_cost)
     assert len(nothing.through(1)) == 0
+
+
+def test_the_least_of_each_group_and_where_it_is_first():
+    value, group = np.array([3.0, 1.0, 1.0, np.inf, 2.0]), np.array([2, 0, 0, 3, 2])
+    least, index = least_of_groups(value, group, 5)
+    np.testing.assert_array_equal(least, [1, np.inf, 2, np.inf, np.inf])
+    assert index.tolist() == [1, -1, 4, 3, -1]
+    assert least_of_groups(np.zeros(0), np.zeros(0, int), 2)[1].tolist() == [-1, -1]
+
+
+@pytest.fixture
+def three_parts(make_graph):
+    """A song of 5 intervals; clip 1 is joined to clip 0, clip 2 to clip 1 at a price, and clip 3 to none."""
+    beats = np.arange(6) * 0.5
+    return make_graph([beats] * 4, [(2, 8, 0.2), (9, 15, 0.4)], both_ways=False), beats
+
+
+def test_groups_are_priced_in_one_interval_by_their_cheapest_step(three_parts):
+    graph, beats = three_parts
+    found = proposals_of(graph, beats, np.array([0]))
+    prices = price_groups([found], 4, 5, graph.clip_index, np.array([True, True, True, True]), most=0)
+    through = found.through(4)
+    for clip in range(4):
+        nodes = graph.clip_index == clip
+        assert prices.cost[clip] == through[nodes].min()
+    assert prices.node[1] == 10
+    assert np.isinf(prices.cost[3])
+    assert not prices.is_left.any()
+    some = price_groups([found], 4, 5, graph.clip_index, np.array([True, False, True, True]), most=0)
+    assert np.isinf(some.cost[1])
+    assert some.node[1] == -1
+
+
+def test_over_several_intervals_the_least_bounds_are_priced_and_the_rest_left(three_parts):
+    graph, beats = three_parts
+    found = proposals_of(graph, beats, np.array([0]))
+    every = np.ones(4, bool)
+    prices = price_groups([found], 3, 5, graph.clip_index, every, most=9)
+    for clip in range(4):
+        assert prices.cost[clip] == found.within(3, 5, graph.clip_index == clip)
+    assert (prices.node == -1).all()
+    assert not prices.is_left.any()
+    one = price_groups([found], 3, 5, graph.clip_index, every, most=1)
+    assert one.cost[0] == prices.cost[0]
+    assert np.isinf(one.cost[1:]).all()
+    assert one.is_left[1]
+    assert not one.is_left[[0, 3]].any()
+
+
+def test_what_the_first_song_cannot_the_next_may(three_parts):
+    graph, beats = three_parts
+    strict, free = (proposals_of(graph, beats, starts) for starts in (np.array([0]), np.arange(24)))
+    for last in (4, 5):
+        both = price_groups([strict, free], 3, last, graph.clip_index, np.ones(4, bool), most=9)
+        alone = price_groups([strict], 3, last, graph.clip_index, np.ones(4, bool), most=9)
+        assert np.isinf(alone.cost[3])
+        assert both.cost[3] == free.within(3, last, graph.clip_index == 3)
+        known = np.isfinite(alone.cost)
+        np.testing.assert_array_equal(both.cost[known], alone.cost[known])
