@@ -5,7 +5,7 @@ old one or the new one. Files of one table and content are byte-equal.
 """
 
 from collections.abc import Iterable
-from typing import IO
+from typing import IO, Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -59,7 +59,7 @@ class Lake:
     def stamp(self, asset: str, key: str = "") -> Stamp | None:
         """Stamp of a stored partition; None when it is not stored or was written by something else."""
         try:
-            with self.path(asset, key).open("rb") as file:
+            with _opened(self.path(asset, key)) as file:
                 metadata = pq.read_schema(file).metadata or {}
             if metadata.get(b"version", b"").decode() != str(TABLES[asset].version):
                 return None
@@ -78,7 +78,7 @@ class Lake:
         path = self.path(asset, key)
         filters = None if clip_ids is None else pc.field("clip_id").isin(pa.array(sorted(clip_ids), pa.string()))
         try:
-            with path.open("rb") as file:
+            with _opened(path) as file:
                 table = pq.read_table(file, filters=filters)
             return TABLES[asset].check(table)
         except FileNotFoundError as error:
@@ -117,6 +117,15 @@ class Lake:
 MOST_ROW_GROUPS = 4096
 """Clips of a file up to which each has a row group of its own, so that one can be read alone. Chosen by hand: the
 footer grows with them."""
+
+
+def _opened(path: UPath) -> Any:  # noqa: ANN401 - a file of Arrow's own, or one of Python's
+    """Open a file to be read, by Arrow itself where it lies on a disk.
+
+    Arrow's threads let go of a file of Python's late. At the end of the process Python then ends the thread, and with
+    it the process: "terminate called without an active exception".
+    """
+    return pa.OSFile(str(path)) if path.protocol in ("", "file") else path.open("rb")
 
 
 def _write_parquet(table: pa.Table, file: IO[bytes]) -> None:
