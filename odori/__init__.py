@@ -33,8 +33,7 @@ _HOMES = {
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 
-__all__ = [  # noqa: RUF022 - what one starts with comes first
-    "open",
+__all__ = [  # noqa: RUF022 - what one starts with comes first; not `open`, which would hide Python's own
     "demo",
     "read",
     "song_beats",
@@ -58,6 +57,7 @@ __all__ = [  # noqa: RUF022 - what one starts with comes first
     "Draft",
     "PinProposal",
     "FrameOrigin",
+    "open",
 ]
 
 
@@ -71,4 +71,4 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever is asked for
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *_HOME})

@@ -53,6 +53,9 @@ class PoseSequence:
     rotation_wxyz: Float
     position_xyz_m: Float
 
+    def __repr__(self) -> str:
+        return f"<poses {self.name}: {self.n_frames} frames at {self.frame_rate_hz:g} Hz>"
+
     @property
     def joints(self) -> tuple[str, ...]:
         """Names of the 22 joints, as VRM 1.0 has them, in the order of the arrays."""
@@ -91,7 +94,7 @@ class PoseSequence:
 
 @dataclass(frozen=True, eq=False)
 class BeatTimes:
-    """BeatTimes of a song, in order.
+    """Beats of a song, in order.
 
     Parameters
     ----------
@@ -124,9 +127,13 @@ class BeatTimes:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def __repr__(self) -> str:
+        tempo_bpm = self.tempo_bpm
+        return f"<{len(self)} beats{'' if tempo_bpm is None else f', {tempo_bpm:.1f} a minute'}>"
+
     @property
     def tempo_bpm(self) -> float | None:
-        """BeatTimes a minute, by the median interval; None for fewer than two beats."""
+        """Beats a minute, by the median interval; None for fewer than two beats."""
         if len(self.time_s) < 2:
             return None
         interval_s = sorted((self.time_s[1:] - self.time_s[:-1]).tolist())
@@ -261,6 +268,15 @@ class Listing(Sequence[Listed]):
 
     def __contains__(self, item: object) -> bool:
         return item in self._rows or any(row.key == item for row in self._rows)
+
+    def has(self, key: str) -> bool:
+        """Whether a row has this key.
+
+        Parameters
+        ----------
+        key : str
+        """
+        return any(row.key == key for row in self._rows)
 
     def keys(self) -> list[str]:
         """Keys, in order."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kernels.types import Float
+from odori import checks
 from odori.answers import BeatTimes
 from odori.exceptions import InputError, refused
 
@@ -21,6 +22,12 @@ SLOWEST_RATE_HZ, FASTEST_RATE_HZ = 4_000.0, 768_000.0
 
 LOUDEST = 16.0
 """Largest sample, full scale 1. Chosen by hand, between decoded sound, which stays near 1, and unscaled integers."""
+
+LARGEST_RHYTHM = 1e100
+"""Largest value of a rhythm. Chosen so that products of two stay finite."""
+
+MOST_JOINTS = 150
+"""Joints of a body at most, fingers and twists among them. Chosen by hand, to tell joints from frames."""
 
 
 def track_beats(samples: ArrayLike, rate_hz: float) -> BeatTimes:
@@ -87,8 +94,8 @@ def score_beats(
     Parameters
     ----------
     beats_s, reference_s : (B,) float, seconds, rising; or BeatTimes
-    tolerance_s : float, seconds, > 0
-        BeatTimes no further apart count as the same, each at most once.
+    tolerance_s : float, seconds, above 0 and at most 1
+        Beats no further apart count as the same, each at most once.
 
     Returns
     -------
@@ -119,8 +126,8 @@ def score_beats(
     from kernels.assembly.quality import f_measure
 
     found, wanted = _times("beats_s", beats_s), _times("reference_s", reference_s)
-    if not _number("tolerance_s", tolerance_s) > 0:
-        raise InputError(f"tolerance_s: want > 0, got {tolerance_s}")
+    if not 0 < _number("tolerance_s", tolerance_s) <= 1:
+        raise InputError(f"tolerance_s: want seconds, above 0 and at most 1, got {tolerance_s}")
     return f_measure(found, wanted, tolerance_s=float(tolerance_s))
 
 
@@ -161,6 +168,8 @@ def motion_beats(position_xyz_m: ArrayLike, rate_hz: float) -> Float:
     position = _array("position_xyz_m", position_xyz_m).astype(np.float64)
     if position.ndim != 3 or position.shape[1] < 1 or position.shape[2] != 3:
         raise InputError(f"position_xyz_m: want (F, J, 3), got {position.shape}")
+    if position.shape[1] > max(MOST_JOINTS, position.shape[0]):
+        raise InputError(f"position_xyz_m: want (F, J, 3), got {position.shape}, joints first; swap the first two axes")
     _check_finite("position_xyz_m", position)
     if not _number("rate_hz", rate_hz) > 0:
         raise InputError(f"rate_hz: want frames a second, > 0, got {rate_hz}")
@@ -242,6 +251,14 @@ def match(
     """
     from kernels.matching.score import SCALES
 
+    for name, given in (("segments", segments), ("clips", clips)):
+        if not isinstance(given, Mapping | Sequence) and not hasattr(given, "__array__"):
+            raise InputError(f"{name}: want a sequence of (n,) arrays, got {type(given).__name__}")
+    if isinstance(segments, np.ndarray) and segments.ndim != 1 and len(segments.shape) and segments.dtype != object:
+        raise InputError(
+            f"segments: want a sequence of (n,), got {segments.shape}; give list(segments) if rows are meant"
+        )
+    segments, clips = _from_table(segments), _from_table(clips)
     names: list[str] | list[int] = list(clips) if isinstance(clips, Mapping) else list(range(len(clips)))
     series = list(clips.values()) if isinstance(clips, Mapping) else list(clips)
     motions = [_rhythm(f"clips[{name!r}]", one) for name, one in zip(names, series, strict=True)]
@@ -249,8 +266,8 @@ def match(
     is_one |= isinstance(segments, Sequence) and bool(segments) and np.ndim(segments[0]) == 0
     parts: Sequence[ArrayLike] = [segments] if is_one else list(segments)  # type: ignore[arg-type, list-item]
     music = [_rhythm(f"segments[{index}]", one) for index, one in enumerate(parts)]
-    if k < 1:
-        raise InputError(f"k: want >= 1, got {k}")
+    k = checks.count("k", k)
+    device = checks.key("device", device)
     if not motions or not music:
         return [[] for _ in music]
     with refused():
@@ -312,8 +329,8 @@ def _rhythm(name: str, values: ArrayLike) -> NDArray[np.floating]:
     if curve.ndim != 1 or not len(curve):
         raise InputError(f"{name}: want (n,) with n >= 1, got {curve.shape}")
     _check_finite(name, curve)
-    if (curve < 0).any():
-        raise InputError(f"{name}: want >= 0, got {curve.min():g}")
+    if (curve < 0).any() or float(curve.max()) > LARGEST_RHYTHM:
+        raise InputError(f"{name}: want 0 to {LARGEST_RHYTHM:g}, got {curve.min():g} to {curve.max():g}")
     return curve
 
 
@@ -334,9 +351,13 @@ def _array(name: str, values: ArrayLike) -> NDArray[np.floating]:
     return array if array.dtype.kind == "f" else array.astype(np.float64)
 
 
+def _from_table(values: Any) -> Any:  # noqa: ANN401 - a column of Arrow or Polars, or what was given
+    return values.to_numpy() if hasattr(values, "to_numpy") and not hasattr(values, "columns") else values
+
+
 def _plain(name: str, values: ArrayLike) -> NDArray[Any]:
     try:
-        return np.asarray(values)
+        return np.asarray(_from_table(values))
     except ValueError as error:
         raise InputError(f"{name}: want an array of numbers, got rows of different lengths") from error
 

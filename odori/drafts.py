@@ -6,6 +6,7 @@ What was read stays in memory, so that asking again is quick; it is read anew wh
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import polars as pl
 from threadpoolctl import threadpool_limits
@@ -21,6 +22,7 @@ from assets.tables.music import to_music_beat
 from odori.exceptions import DanceRefusedError, OdoriError, refused
 from odori.made_dances import Draft, PinProposal, dance_poses
 from pipelines.studio.folder import StudioFolder
+from pipelines.studio.inventory import songs_found
 from pipelines.studio.stored import RememberedTable, TableMemory
 from schemas.catalog import TABLES
 
@@ -88,6 +90,7 @@ def draft_song(
     with refused(), threadpool_limits(limits=1):
         studio = room.folder
         settings = studio.settings()
+        _check_readable(room, song)
         way = method or brief_of(studio, song).method
         if way not in METHODS:
             raise OdoriError(f"method: want one of {', '.join(METHODS)}, got {way!r}")
@@ -111,9 +114,7 @@ def draft_song(
             frame_rate_hz=frame_rate_hz or settings.dance.frame_rate_hz,
         )
         moved = dance_poses(f"{song}|{way}", from_dance_pose(song, way, dance))
-    steps = pl.from_arrow(rows)
-    assert isinstance(steps, pl.DataFrame)
-    return Draft(song, way, steps, moved)
+    return Draft(song, way, cast(pl.DataFrame, pl.from_arrow(rows)), moved)
 
 
 def place_pins(room: DraftRoom, song: str, place: str, *, pins: Sequence[str] = ()) -> list[PinProposal]:
@@ -131,6 +132,7 @@ def place_pins(room: DraftRoom, song: str, place: str, *, pins: Sequence[str] = 
         As there.
     """
     with refused(), threadpool_limits(limits=1):
+        _check_readable(room, song)
         _make_where_lacking(room, proposals.INPUTS, song, USUAL)
         inputs = {name: room.stored(name, song) for name in proposals.INPUTS}
         texts = _without_likeness(room.folder, pins)
@@ -149,6 +151,15 @@ def place_pins(room: DraftRoom, song: str, place: str, *, pins: Sequence[str] = 
             for name in facts["out_of_reach"][f"{kind}s"]
         ]
     return sorted(found, key=lambda p: (not p.is_within_reach, p.steps_outside_warp_bounds, p.extra_cost))
+
+
+def _check_readable(room: DraftRoom, song: str) -> None:
+    """Refuse a song whose file or brief was refused, by its own reason."""
+    sources = room.folder.sources()
+    room.folder.brief(sources.song(song))
+    for file in songs_found(sources, room.folder.lake):
+        if file["key"] == song and file["reason"]:
+            raise OdoriError(f"{song}: it was refused: {file['reason']}")
 
 
 def _make_where_lacking(room: DraftRoom, names: Sequence[str], song: str, method: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pyarrow as pa
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from assets.tables.music import to_music_beat
 from assets.tables.pack import concat
+from odori import checks
 from odori.answers import BeatTimes, CatalogueClip, CatalogueSong, Listing, PoseSequence
 from odori.exceptions import OdoriError, refused
 from odori.made_dances import MadeDance, dance_poses
@@ -167,7 +168,10 @@ class Holdings:
         self._known(name)
         with refused():
             if key is not None:
-                return self._folder.lake.table(name, key)
+                wanted = checks.key("key", key)
+                if wanted not in self._folder.lake.keys(name):
+                    raise OdoriError(f"{name}: want a partition that is stored, {wanted!r} is not built")
+                return self._folder.lake.table(name, wanted)
             parts = [self._folder.lake.table(name, one) for one in self._keys(name)]
             return concat(TABLES[name], parts)
 
@@ -201,8 +205,7 @@ class Holdings:
         import polars as pl
 
         found = pl.from_arrow(self.table(name, key=key))
-        assert isinstance(found, pl.DataFrame)
-        return found
+        return cast(pl.DataFrame, found)
 
     def numpy(self, name: str, *, key: str | None = None) -> dict[str, NDArray[Any]]:
         """Read a table of the lake as arrays by column.
@@ -300,7 +303,9 @@ class Holdings:
         clips, odori.read
         MadeDance.poses : of a dance
         """
-        row = self.clips[clip if isinstance(clip, str) else clip.clip_id]
+        wanted, clips = checks.key("clip", clip), self.clips
+        named = [one for one in clips if self._is_of(wanted, one.path)]
+        row = named[0] if named and not clips.has(wanted) else clips[wanted]
         if row.reason:
             raise OdoriError(f"{row.clip_id}: it was refused: {row.reason}")
         with refused():
@@ -344,15 +349,19 @@ class Holdings:
         return BeatTimes(grid.time_s, grid.bar_number, grid.beat_in_bar_number, grid.confidence)
 
     def _song(self, song: str | CatalogueSong) -> CatalogueSong:
-        if isinstance(song, CatalogueSong):
-            return song
-        songs = self.songs
-        named = [one for one in songs if song in (one.path, Path(one.path).name, Path(one.path).stem)]
-        is_key = any(one.song_id == song for one in songs)
-        return named[0] if named and not is_key else songs[song]
+        wanted, songs = checks.key("song", song), self.songs
+        named = [
+            one
+            for one in songs
+            if wanted in (Path(one.path).name, Path(one.path).stem) or self._is_of(wanted, one.path)
+        ]
+        return named[0] if named and not songs.has(wanted) else songs[wanted]
+
+    def _is_of(self, wanted: str, path: str) -> bool:
+        return wanted == path or Path(wanted).absolute() == (self.root / path).absolute()
 
     def _known(self, name: str) -> None:
-        if name not in TABLES:
+        if not isinstance(name, str) or name not in TABLES:
             raise OdoriError(f"{name}: want a table, got none of that name; they are {', '.join(sorted(TABLES))}")
 
     def _keys(self, name: str) -> list[str]:

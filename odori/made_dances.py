@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import pyarrow as pa
 
 from assets.tables.pack import frame_rate_hz, to_array
+from odori import checks
 from odori.answers import PoseSequence
-from odori.exceptions import refused
+from odori.exceptions import InputError, OdoriError, refused
 from pipelines.studio.folder import StudioFolder
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class MadeDance:
-    """A finished dance of a studio: its stage on disk and what is known of it.
+    """A finished dance of a studio, as it stands: danced again, it is the new one.
 
     Parameters
     ----------
@@ -63,12 +64,16 @@ class MadeDance:
         """The stage in one file, the song in it."""
         return self.stage.with_suffix(".usdz")
 
-    @cached_property
+    @property
     def report(self) -> dict[str, Any]:
         """What ``<method>.json`` beside the stage says: measures, what is wanted of them, licence, provenance."""
-        with refused():
-            found: dict[str, Any] = json.loads(self.stage.with_suffix(".json").read_bytes())
-        return found
+        place = self.stage.with_suffix(".json")
+        try:
+            with refused():
+                found: dict[str, Any] = json.loads(place.read_bytes())
+            return {name: found[name] for name in ("quality", "wanted", "licence")} | found
+        except (InputError, KeyError, TypeError) as error:
+            raise OdoriError(f"{place}: is no report of a dance; dance the song again") from error
 
     @property
     def quality(self) -> dict[str, float]:
@@ -90,7 +95,7 @@ class MadeDance:
         """Licence of the dance, from those of its clips."""
         return dict(self.report["licence"])
 
-    @cached_property
+    @property
     def pins(self) -> list[dict[str, Any]]:
         """Of each pin asked for: ``pin``, ``from_s``, ``to_s``, ``clips``, ``is_kept``."""
         from pipelines.commands.dance_report import facts_of
@@ -98,17 +103,17 @@ class MadeDance:
         with refused():
             return list(facts_of(self._folder, self.song, self.method)["pins"])
 
-    @cached_property
+    @property
     def steps(self) -> pl.DataFrame:
         """What is danced when, one row a step: the table ``choreography``."""
         return self._table("choreography")
 
-    @cached_property
+    @property
     def frames(self) -> pl.DataFrame:
         """Where each frame comes from: the table ``frame_lineage``."""
         return self._table("frame_lineage")
 
-    @cached_property
+    @property
     def poses(self) -> PoseSequence:
         """Poses of every frame."""
         with refused():
@@ -148,8 +153,7 @@ class MadeDance:
 
         with refused():
             found = pl.from_arrow(self._folder.lake.table(name, self.key))
-        assert isinstance(found, pl.DataFrame)
-        return found
+        return cast(pl.DataFrame, found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +173,7 @@ class Draft:
 
     song: str
     method: str
-    steps: pl.DataFrame
+    steps: pl.DataFrame = field(repr=False)
     poses: PoseSequence
 
 
@@ -246,7 +250,7 @@ def explain_frame(root: Path, dance: str, time_s: float) -> FrameOrigin:
     from pipelines.commands.why import explain_dance
 
     with refused():
-        facts = explain_dance(root, dance, at_s=float(time_s)).facts
+        facts = explain_dance(root, dance, at_s=checks.number("time_s", time_s, least=-inf, most=inf)).facts
     names = ("clip_id", "clip_time_s", "path", "label", "style", "licence", "is_mirrored", "warp_ratio", "blend")
     told = {name: facts[name] for name in names}
     return FrameOrigin(**told, pin=facts["pin"] or None, costs=dict(facts["step"]["costs"]), facts=facts)

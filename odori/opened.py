@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
 
+from odori import checks
 from odori.answers import CatalogueClip, CatalogueSong, SearchHit
 from odori.exceptions import DanceRefusedError, OdoriError, refused
 from odori.holdings import Holdings
@@ -57,7 +57,7 @@ def open(folder: str | PathLike[str] = "studio") -> OpenStudio:
 def _opened(folder: str | PathLike[str]) -> OpenStudio:
     settle()
     with refused():
-        return OpenStudio(existing(Path(folder)))
+        return OpenStudio(existing(checks.path("folder", folder)))
 
 
 def demo(folder: str | PathLike[str] = "demo") -> OpenStudio:
@@ -89,7 +89,7 @@ def demo(folder: str | PathLike[str] = "demo") -> OpenStudio:
     from pipelines.commands import demo_studio
 
     with refused():
-        demo_studio.make(Path(folder))
+        demo_studio.make(checks.path("folder", folder))
     studio = _opened(folder)
     studio.build()
     return studio
@@ -146,7 +146,10 @@ class OpenStudio(Holdings):
         self._room: DraftRoom | None = None
 
     def __repr__(self) -> str:
-        return f"<odori studio {self.root.name}: {len(self.clips)} clips, {len(self.songs)} songs>"
+        try:
+            return f"<odori studio {self.root.name}: {len(self.clips)} clips, {len(self.songs)} songs>"
+        except OdoriError:  # settings that are none: reading them says which
+            return f"<odori studio {self.root.name}>"
 
     def build(self, *, dances: bool = False) -> BuildReport:
         """Bring everything up to date, as ``odori build``: only what changed is computed.
@@ -212,7 +215,7 @@ class OpenStudio(Holdings):
         song : its key, or the name of its file
         method : ``graph``, ``matching`` or ``hmm``; None for the one its brief names
         pins : what to dance when, as typed: ``12-16=spin``, ``bar:9-12=style:salsa``
-        frame_rate_hz : of the stage; None for the setting's
+        frame_rate_hz : of the stage, 1 to 240; None for the setting's
         out : where to copy the stage, ``.usdz`` or ``.usdc``
         alternatives : how many different dances to make; the first is returned, all are in :attr:`dances`
         character : clip or USD file whose body dances
@@ -253,15 +256,15 @@ class OpenStudio(Holdings):
             done = dance_songs(
                 self.root,
                 [row.song_id],
-                method=method,
-                frame_rate_hz=frame_rate_hz,
-                out=None if out is None else Path(out),
+                method=None if method is None else checks.key("method", method),
+                frame_rate_hz=_rate(frame_rate_hz),
+                out=None if out is None else checks.path("out", out),
                 progress=NoProgress,
-                pins=[pins] if isinstance(pins, str) else pins,
-                alternatives=alternatives,
-                character=character,
-                temperature=temperature,
-                seed=seed,
+                pins=checks.texts("pins", pins),
+                alternatives=checks.count("alternatives", alternatives),
+                character=checks.key("character", character) if character else "",
+                temperature=_temperature(temperature),
+                seed=checks.count("seed", seed, least=0),
             )
         if done.status == 2:
             facts = done.facts
@@ -316,11 +319,11 @@ class OpenStudio(Holdings):
         return draft_song(
             self._drafts(),
             self._song(song).song_id,
-            method=method,
-            pins=[pins] if isinstance(pins, str) else pins,
-            frame_rate_hz=frame_rate_hz,
-            temperature=temperature,
-            seed=seed,
+            method=None if method is None else checks.key("method", method),
+            pins=checks.texts("pins", pins),
+            frame_rate_hz=_rate(frame_rate_hz),
+            temperature=_temperature(temperature),
+            seed=checks.count("seed", seed, least=0),
         )
 
     def propose(self, song: str | CatalogueSong, at: str | float, *, pins: Sequence[str] = ()) -> list[PinProposal]:
@@ -358,9 +361,9 @@ class OpenStudio(Holdings):
         """
         from odori.drafts import place_pins
 
-        place = f"{at:g}" if isinstance(at, int | float) else at
-        pins = [pins] if isinstance(pins, str) else pins
-        return place_pins(self._drafts(), self._song(song).song_id, place, pins=pins)
+        is_seconds = isinstance(at, int | float) and not isinstance(at, bool)
+        place = f"{at:g}" if is_seconds else checks.key("at", at)
+        return place_pins(self._drafts(), self._song(song).song_id, place, pins=checks.texts("pins", pins))
 
     def why(self, dance: str | MadeDance | PathLike[str], time_s: float) -> FrameOrigin:
         """Say where a moment of a dance comes from, and why it was chosen.
@@ -391,7 +394,7 @@ class OpenStudio(Holdings):
         --------
         MadeDance.why
         """
-        return explain_frame(self.root, dance.key if isinstance(dance, MadeDance) else str(dance), time_s)
+        return explain_frame(self.root, checks.key("dance", dance), time_s)
 
     def search(
         self,
@@ -440,12 +443,17 @@ class OpenStudio(Holdings):
         from pipelines.commands import search_motions as searching
         from pipelines.resources import NoProgress
 
-        if k < 1:
-            raise OdoriError(f"k: want >= 1, got {k}")
-        query = clip.clip_id if isinstance(clip, CatalogueClip) else str(clip)
-        lists = (label, style, licence, like, unlike)
-        label, style, licence, like, unlike = ([one] if isinstance(one, str) else list(one) for one in lists)
-        wish = searching.MotionQuery(query, k, label, style, licence, min_seconds, max_seconds, like, unlike)
+        wish = searching.MotionQuery(
+            checks.key("clip", clip) if clip else "",
+            checks.count("k", k),
+            label=checks.texts("label", label),
+            style=checks.texts("style", style),
+            licence=checks.texts("licence", licence),
+            min_seconds=checks.number("min_seconds", min_seconds, least=0.0, most=float("inf")),
+            max_seconds=checks.number("max_seconds", max_seconds, least=0.0, most=float("inf")),
+            like=checks.texts("like", like),
+            unlike=checks.texts("unlike", unlike),
+        )
         with refused(), threadpool_limits(limits=1):
             facts = searching.search(self.root, wish, progress=NoProgress).facts
         names = SearchHit.__dataclass_fields__
@@ -458,3 +466,15 @@ class OpenStudio(Holdings):
         if self._room is None:
             self._room = DraftRoom(self._folder)
         return self._room
+
+
+def _rate(frame_rate_hz: float | None) -> float | None:
+    return (
+        None
+        if frame_rate_hz is None
+        else checks.number("frame_rate_hz", frame_rate_hz, least=1.0, most=checks.MOST_FRAMES_HZ)
+    )
+
+
+def _temperature(temperature: float | None) -> float | None:
+    return None if temperature is None else checks.number("temperature", temperature, least=0.0, most=checks.WARMEST)

@@ -11,8 +11,9 @@ import numpy as np
 
 from kernels.skeleton.naming import JointMapping
 from kernels.types import Clip, Float
+from odori import checks
 from odori.answers import BeatTimes, PoseSequence
-from odori.exceptions import OdoriError, refused
+from odori.exceptions import InputError, OdoriError, refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,11 @@ class MotionTake:
     path: Path
     clip: Clip
     mapping: JointMapping | None
+
+    def __repr__(self) -> str:
+        return (
+            f"<take {self.name}: {self.clip.n_frames} frames of {len(self.joints)} joints at {self.frame_rate_hz:g} Hz>"
+        )
 
     @property
     def frame_rate_hz(self) -> float:
@@ -126,7 +132,9 @@ def read(path: str | PathLike[str], *, joints: Mapping[str, str] | None = None) 
     MotionTake.canonical : on odori's 22 joints
     song_beats : of a music file
     """
-    place = Path(path)
+    place = checks.path("path", path)
+    if joints is not None and not isinstance(joints, Mapping):
+        raise InputError(f"joints: want a mapping of names to odori's joints, got {joints!r}")
     suffix = place.suffix.lower()
     if suffix not in (".bvh", ".parquet", ".csv"):
         raise OdoriError(
@@ -198,7 +206,7 @@ def song_beats(path: str | PathLike[str]) -> BeatTimes:
     from assets.sources.scan import MIDI_SUFFIXES
     from odori.arrays import track_beats
 
-    place = Path(path)
+    place = checks.path("path", path)
     if not place.is_file():
         raise OdoriError(f"{place}: want a music file, got nothing there")
     with refused():

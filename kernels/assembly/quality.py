@@ -32,6 +32,10 @@ LONGEST_BEAT_S = 20.0
 """Chosen so that no music is refused and milliseconds are: 3 beats a minute, against beats 200 to 2000 apart."""
 
 
+LATEST_BEAT_S = 30_000.0
+"""Latest beat, seconds: the bound that mir_eval has, by convention."""
+
+
 def check_beats(name: str, time_s: Float) -> None:
     """Refuse times that cannot be beats in seconds.
 
@@ -52,6 +56,8 @@ def check_beats(name: str, time_s: Float) -> None:
         raise ValueError(f"{name}: want finite seconds, got {time_s[~np.isfinite(time_s)][0]}")
     if len(time_s) and np.min(time_s) < 0:
         raise ValueError(f"{name}: want seconds >= 0, got {np.min(time_s):g}")
+    if len(time_s) and np.max(time_s) > LATEST_BEAT_S:
+        raise ValueError(f"{name}: want seconds, got a beat at {np.max(time_s):g}; were they given in milliseconds?")
     step_s = np.diff(time_s)
     if not (step_s > 0).all():
         at = int(np.flatnonzero(step_s <= 0)[0])

@@ -89,6 +89,7 @@ def test_silence_has_no_beats():
         ([0.5, 0.5, 1.5], "want rising times"),
         ([-0.5, 0.5], "want seconds >= 0, got -0.5"),
         ([0.5, np.nan], "want finite seconds, got nan"),
+        ([40_000.0], "want seconds, got a beat at 40000; were they given in milliseconds"),
         ([[0.5, 1.0]], r"want \(B,\) seconds, got \(1, 2\)"),
     ],
 )
@@ -104,7 +105,7 @@ def test_beats_are_scored_one_to_one_within_the_tolerance():
     assert odori.score_beats([0.5, 0.56], [0.53]) == pytest.approx(2 / 3)
     assert odori.score_beats([0.5], [0.6]) == 0
     assert odori.score_beats([0.5], [0.6], tolerance_s=0.11) == 1
-    with pytest.raises(odori.InputError, match="tolerance_s: want > 0, got 0"):
+    with pytest.raises(odori.InputError, match="tolerance_s: want seconds, above 0 and at most 1, got 0"):
         odori.score_beats([0.5], [0.6], tolerance_s=0)
 
 
@@ -121,6 +122,7 @@ def test_a_swing_slows_down_twice_a_cycle():
         (np.zeros((10, 3)), 60, r"position_xyz_m: want \(F, J, 3\), got \(10, 3\)"),
         (np.zeros((10, 3, 22)), 60, r"position_xyz_m: want \(F, J, 3\), got \(10, 3, 22\)"),
         (np.full((10, 1, 3), np.nan), 60, r"position_xyz_m: want finite values, got nan at \(0, 0, 0\)"),
+        (np.zeros((22, 300, 3)), 60, r"got \(22, 300, 3\), joints first; swap the first two axes"),
         (np.zeros((10, 1, 3)), 0, "rate_hz: want frames a second, > 0, got 0"),
     ],
 )
@@ -169,7 +171,10 @@ def test_a_device_gives_the_same_to_the_bit(rhythms):
     [
         ([np.ones((3, 2))], {"a": np.ones(9)}, r"segments\[0\]: want \(n,\) with n >= 1, got \(3, 2\)"),
         ([np.zeros(0)], {"a": np.ones(9)}, r"segments\[0\]: want \(n,\) with n >= 1, got \(0,\)"),
-        ([np.ones(3)], {"a": -np.ones(9)}, r"clips\['a'\]: want >= 0, got -1"),
+        ([np.ones(3)], {"a": -np.ones(9)}, r"clips\['a'\]: want 0 to 1e\+100, got -1"),
+        (np.ones((3, 9)), {"a": np.ones(9)}, r"segments: want a sequence of \(n,\), got \(3, 9\)"),
+        ([np.ones(3)], {"a": np.full(9, 1e200)}, r"clips\['a'\]: want 0 to 1e\+100"),
+        (None, {"a": np.ones(9)}, r"segments: want a sequence of \(n,\) arrays, got NoneType"),
         ([np.ones(3)], [np.full(9, np.nan)], r"clips\[0\]: want finite values, got nan at 0"),
     ],
 )
@@ -179,7 +184,7 @@ def test_rhythms_that_cannot_be_meant_are_refused(segments, clips, words):
 
 
 def test_counts_and_devices_that_are_none_are_refused(rhythms):
-    with pytest.raises(odori.InputError, match="k: want >= 1, got 0"):
+    with pytest.raises(odori.InputError, match="k: want a whole number >= 1, got 0"):
         odori.match([np.ones(10)], rhythms, k=0)
     with pytest.raises(odori.OdoriError, match="no-such-device"):
         odori.match([np.ones(10)], rhythms, device="no-such-device")

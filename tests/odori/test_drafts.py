@@ -76,3 +76,28 @@ def test_a_table_is_read_again_when_its_file_changed(studio):
         studio.draft("drum_machine")
     path.unlink()
     assert studio.draft("drum_machine").steps.equals(first.steps)
+
+
+def test_a_song_that_is_refused_is_refused_by_its_own_reason(studio):
+    brief = studio.root / "songs" / "drum_machine.brief.toml"
+    brief.write_text('method = "hmmm"\n', encoding="utf-8")
+    for ask in (lambda: studio.draft("drum_machine"), lambda: studio.propose("drum_machine", 12)):
+        with pytest.raises(odori.OdoriError, match="method: want one of"):
+            ask()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"frame_rate_hz": 0.5}, "frame_rate_hz: want a number from 1 to 240, got 0.5"),
+        ({"frame_rate_hz": "30"}, "frame_rate_hz: want a number"),
+        ({"temperature": -1}, "temperature: want a number from 0 to 10, got -1"),
+        ({"temperature": float("nan")}, "temperature: want a number from 0 to 10, got nan"),
+        ({"seed": 1.5}, "seed: want a whole number >= 0, got 1.5"),
+        ({"pins": [12]}, "pins: want text, as it is typed, got 12"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_by_drafts_and_dances_alike(shown, more, words):
+    for ask in (shown.draft, shown.dance):
+        with pytest.raises(odori.InputError, match=words):
+            ask("drum_machine", **more)

@@ -77,7 +77,7 @@ def test_what_is_none_is_refused_by_its_name(shown):
         shown.dance("drum_machine", method="tango")
     with pytest.raises(odori.OdoriError, match="12spin"):
         shown.dance("drum_machine", pins="12spin")
-    with pytest.raises(odori.OdoriError, match="k: want >= 1, got 0"):
+    with pytest.raises(odori.OdoriError, match="k: want a whole number >= 1, got 0"):
         shown.search("ayame-kick_01", k=0)
     with pytest.raises(odori.OdoriError, match="nothing to look for"):
         shown.search()
