@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
+from upath import UPath
 
 from assets.formats import bvh, motion_index
 from assets.formats.errors import FormatError
-from assets.formats.file_names import file_name
 from assets.formats.settings_file import read_settings
 from assets.tables import pack
 from assets.tables import search as search_tables
@@ -26,6 +25,7 @@ from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget
 from kernels.types import Float
 from pipelines.studio.files import StudioError, write_beside
+from pipelines.studio.lake import Lake
 from schemas.search import MOTION_EMBEDDING, MOTION_ENCODER, MOTION_INDEX
 
 _RANGE = re.compile(r"(?P<name>.+)@(?P<start>\d+(?:\.\d*)?|\.\d+)-(?P<end>\d+(?:\.\d*)?|\.\d+)")
@@ -82,6 +82,7 @@ class SearchCatalogue:
             )
         self.root = root.absolute()
         self.lake = self.root / "lake"
+        self.tables = Lake(UPath(self.lake))
         self.index = motion_index.read(self.lake / MOTION_INDEX.name)
 
     def is_current(self) -> bool:
@@ -99,12 +100,13 @@ class SearchCatalogue:
             write_beside(self.lake / MOTION_INDEX.name / _SEEN, lambda file: file.write(text.encode()))
 
     def _state(self) -> dict[str, list[int]]:
-        files = [p for name in _MADE_FROM for p in sorted((self.lake / name).glob("*.parquet"))]
-        stats = {f"{p.parent.name}/{p.name}": p.stat() for p in files}
+        stored = [(name, key) for name in _MADE_FROM for key in self.tables.keys(name)]
+        versions = {f"{name}/{key}": list(self.tables.version(name, key) or ()) for name, key in stored}
         odori = self.root / "odori.toml"
         if odori.is_file():
-            stats["odori.toml"] = odori.stat()
-        return {name: [s.st_size, s.st_mtime_ns] for name, s in stats.items()}
+            found = odori.stat()
+            versions["odori.toml"] = [found.st_size, found.st_mtime_ns]
+        return versions
 
     def knows(self, text: str) -> bool:
         """Whether a motion can be named without looking for new clips."""
@@ -113,7 +115,7 @@ class SearchCatalogue:
 
     def provenance(self) -> dict[str, Any]:
         """Say what the encoder was trained on."""
-        metadata = pq.read_schema(self._encoder_path()).metadata or {}
+        metadata = self.tables.metadata(MOTION_ENCODER.name)
         said: dict[str, Any] = json.loads(metadata.get(b"provenance", b"{}"))
         return said
 
@@ -151,8 +153,7 @@ class SearchCatalogue:
         clip_id : of a clip of the index
         session : its session
         """
-        path = self.lake / "canonical_pose" / f"{file_name(session)}.parquet"
-        table = pq.read_table(path, columns=["time_s", "position_xyz_m"], filters=pc.field("clip_id") == clip_id)
+        table = self.tables.table("canonical_pose", session, clip_ids=[clip_id])
         return pack.to_array(table["position_xyz_m"]), pack.frame_rate_hz(table)
 
     def _embed(self, text: str, clip_id: str, poses: tuple[Float, float], start_s: float, end_s: float) -> NamedMotion:
@@ -162,10 +163,7 @@ class SearchCatalogue:
         return NamedMotion(text, clip_id, start_s, end_s, self._encoder().embed(*poses, cut), poses)
 
     def _encoder(self) -> Encoder:
-        return from_arrays(search_tables.to_encoder(pq.read_table(self._encoder_path())))
-
-    def _encoder_path(self) -> Path:
-        return self.lake / MOTION_ENCODER.name / "all.parquet"
+        return from_arrays(search_tables.to_encoder(self.tables.table(MOTION_ENCODER.name)))
 
     def _clip(self, name: str) -> pa.Table | None:
         """Rows of a clip by its key, or by its file's path."""
@@ -218,8 +216,8 @@ class SearchCatalogue:
 
     def _refused(self, name: str) -> str:
         """Why a clip of the studio is not in the index; empty where it is no clip."""
-        for file in sorted((self.lake / "clip").glob("*.parquet")):
-            for row in pq.read_table(file, columns=["clip_id", "path", "reason"]).to_pylist():
+        for session in self.tables.keys("clip"):
+            for row in self.tables.table("clip", session).to_pylist():
                 if name in (row["clip_id"], row["path"]) or self._inside(name) == row["path"]:
                     return row["reason"] or "its motion could not be brought to the canonical skeleton"
         return ""

@@ -4,7 +4,7 @@ The only place that writes the lake's Parquet files. A file is written beside an
 old one or the new one. Files of one table and content are byte-equal.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import IO, Any
 
 import pyarrow as pa
@@ -48,19 +48,34 @@ class Lake:
         names = (p.name.removesuffix(".parquet") for p in folder.iterdir() if p.name.endswith(".parquet"))
         return sorted(key_of(name, windows=self._windows) for name in names)
 
-    def version(self, asset: str, key: str = "") -> tuple[int, float] | None:
+    def version(self, asset: str, key: str = "") -> tuple[int, int] | None:
         """Size and time of a stored partition's file, which change when it is written; None when it is not stored."""
         try:
             found = self.path(asset, key).stat()
         except OSError:
             return None
-        return int(found.st_size), float(getattr(found, "st_mtime_ns", found.st_mtime))
+        return int(found.st_size), int(getattr(found, "st_mtime_ns", 1e9 * found.st_mtime))
+
+    def metadata(self, asset: str, key: str = "") -> Mapping[bytes, bytes]:
+        """Read what stands in the footer of a stored partition.
+
+        Parameters
+        ----------
+        asset : str
+        key : of the partition; empty for a table stored whole
+
+        Raises
+        ------
+        OSError
+            If it is not stored, or cannot be read.
+        """
+        with _opened(self.path(asset, key)) as file:
+            return pq.read_schema(file).metadata or {}
 
     def stamp(self, asset: str, key: str = "") -> Stamp | None:
         """Stamp of a stored partition; None when it is not stored or was written by something else."""
         try:
-            with _opened(self.path(asset, key)) as file:
-                metadata = pq.read_schema(file).metadata or {}
+            metadata = self.metadata(asset, key)
             if metadata.get(b"version", b"").decode() != str(TABLES[asset].version):
                 return None
             return Stamp.from_json(metadata[STAMP_KEY].decode())

@@ -41,7 +41,7 @@ def test_tables_and_partitions_that_are_none_are_refused(shown):
         shown.table("beats")
     with pytest.raises(odori.OdoriError, match="want a table"):
         shown.scan("beats")
-    with pytest.raises(odori.OdoriError, match="music_beat is not built for it"):
+    with pytest.raises(odori.OdoriError, match="music_beat: want a partition that is stored, 'waltz' is not built"):
         shown.table("music_beat", key="waltz")
 
 
