@@ -20,7 +20,8 @@ HARD_COST = 4.0
 three songs of real clips and left."""
 
 PACE = WarpWeights(leaving=HARD_COST, easy=(EASY_WARP[0] - 1e-9, EASY_WARP[1] + 1e-9))
-"""What leaving a motion's own pace costs: 1 at a tenth, and more beyond the easy bounds, which rounding may touch."""
+"""What leaving a motion's own pace costs: 1 at a tenth, and more beyond the easy bounds, which rounding may touch.
+Chosen by hand."""
 
 LONGEST_RUN = 16
 """Longer runs are all alike: a dance is not to be one long quotation where it need not be. Motions, chosen by hand."""

@@ -22,7 +22,8 @@ PACE = WarpWeights(pace=0.1)
 the easy bounds: pieces beyond them are for segments that have no others."""
 
 LEAST_BEAT_S = 0.1
-"""Beats nearer to an edge of a segment than this cut nothing off it, seconds: no beat of music is as short."""
+"""Beats nearer to an edge of a segment than this cut nothing off it, seconds. Chosen by hand: no beat of music is
+as short."""
 
 
 @dataclass(frozen=True, eq=False)

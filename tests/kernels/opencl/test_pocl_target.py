@@ -134,10 +134,12 @@ from kernels.opencl.device import build, list_devices
 named = [d for d in list_devices() if d == device]
 print(len(named), repr(fault(device)), repr(pocl_target.name_target(device)))
 context = cl.Context([device])
+from kernels.opencl.match_program import SCALE_BITS, SCALE_DENOMINATOR
+scales = {"SCALE_BITS": SCALE_BITS, "SCALE_DENOMINATOR": SCALE_DENOMINATOR}
 for files, defined in (
     (["pose_distance.cl"], {"ROWS": 8, "LANES": 8}),
-    (["match_score.cl", "match_refine.cl"], {"LANES": 8, "WIDTH": 12, "RUN": 4}),
-    (["match_index.cl"], {"LANES": 8, "WIDTH": 12, "RUN": 4}),
+    (["match_score.cl", "match_refine.cl"], {"LANES": 8, "WIDTH": 12, "RUN": 4, **scales}),
+    (["match_index.cl"], {"LANES": 8, "WIDTH": 12, "RUN": 4, **scales}),
 ):
     print(len(build(context, files, defined, flags=["-w"]).all_kernels()) > 0)
 """)
