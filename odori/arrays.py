@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kernels.types import Float
-from odori import checks
+from odori import inputs
 from odori.answers import BeatTimes
 from odori.exceptions import InputError, refused
 
@@ -266,8 +266,8 @@ def match(
     is_one |= isinstance(segments, Sequence) and bool(segments) and np.ndim(segments[0]) == 0
     parts: Sequence[ArrayLike] = [segments] if is_one else list(segments)  # type: ignore[arg-type, list-item]
     music = [_rhythm(f"segments[{index}]", one) for index, one in enumerate(parts)]
-    k = checks.count("k", k)
-    device = checks.key("device", device)
+    k = inputs.count("k", k)
+    device = inputs.key("device", device)
     if not motions or not music:
         return [[] for _ in music]
     with refused():

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from assets.tables.music import to_music_beat
 from assets.tables.pack import concat
-from odori import checks
+from odori import inputs
 from odori.answers import BeatTimes, CatalogueClip, CatalogueSong, Listing, PoseSequence
 from odori.exceptions import OdoriError, refused
 from odori.made_dances import MadeDance, dance_poses
@@ -168,7 +168,7 @@ class Holdings:
         self._known(name)
         with refused():
             if key is not None:
-                wanted = checks.key("key", key)
+                wanted = inputs.key("key", key)
                 if wanted not in self._folder.lake.keys(name):
                     raise OdoriError(f"{name}: want a partition that is stored, {wanted!r} is not built")
                 return self._folder.lake.table(name, wanted)
@@ -303,7 +303,7 @@ class Holdings:
         clips, odori.read
         MadeDance.poses : of a dance
         """
-        wanted, clips = checks.key("clip", clip), self.clips
+        wanted, clips = inputs.key("clip", clip), self.clips
         named = [one for one in clips if self._is_of(wanted, one.path)]
         row = named[0] if named and not clips.has(wanted) else clips[wanted]
         if row.reason:
@@ -349,7 +349,7 @@ class Holdings:
         return BeatTimes(grid.time_s, grid.bar_number, grid.beat_in_bar_number, grid.confidence)
 
     def _song(self, song: str | CatalogueSong) -> CatalogueSong:
-        wanted, songs = checks.key("song", song), self.songs
+        wanted, songs = inputs.key("song", song), self.songs
         named = [
             one
             for one in songs

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from assets.tables.pack import frame_rate_hz, to_array
-from odori import checks
+from odori import inputs
 from odori.answers import PoseSequence
 from odori.exceptions import InputError, OdoriError, refused
 from pipelines.studio.folder import StudioFolder
@@ -66,7 +66,13 @@ class MadeDance:
 
     @property
     def report(self) -> dict[str, Any]:
-        """What ``<method>.json`` beside the stage says: measures, what is wanted of them, licence, provenance."""
+        """What ``<method>.json`` beside the stage says: measures, what is wanted of them, licence, provenance.
+
+        Raises
+        ------
+        OdoriError
+            If the file is gone, or is no report of a dance.
+        """
         place = self.stage.with_suffix(".json")
         try:
             with refused():
@@ -250,7 +256,7 @@ def explain_frame(root: Path, dance: str, time_s: float) -> FrameOrigin:
     from pipelines.commands.why import explain_dance
 
     with refused():
-        facts = explain_dance(root, dance, at_s=checks.number("time_s", time_s, least=-inf, most=inf)).facts
+        facts = explain_dance(root, dance, at_s=inputs.number("time_s", time_s, least=-inf, most=inf)).facts
     names = ("clip_id", "clip_time_s", "path", "label", "style", "licence", "is_mirrored", "warp_ratio", "blend")
     told = {name: facts[name] for name in names}
     return FrameOrigin(**told, pin=facts["pin"] or None, costs=dict(facts["step"]["costs"]), facts=facts)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
 
-from odori import checks
+from odori import inputs
 from odori.answers import CatalogueClip, CatalogueSong, SearchHit
 from odori.exceptions import DanceRefusedError, OdoriError, refused
 from odori.holdings import Holdings
@@ -57,7 +57,7 @@ def open(folder: str | PathLike[str] = "studio") -> OpenStudio:
 def _opened(folder: str | PathLike[str]) -> OpenStudio:
     settle()
     with refused():
-        return OpenStudio(existing(checks.path("folder", folder)))
+        return OpenStudio(existing(inputs.path("folder", folder)))
 
 
 def demo(folder: str | PathLike[str] = "demo") -> OpenStudio:
@@ -89,7 +89,7 @@ def demo(folder: str | PathLike[str] = "demo") -> OpenStudio:
     from pipelines.commands import demo_studio
 
     with refused():
-        demo_studio.make(checks.path("folder", folder))
+        demo_studio.make(inputs.path("folder", folder))
     studio = _opened(folder)
     studio.build()
     return studio
@@ -256,15 +256,15 @@ class OpenStudio(Holdings):
             done = dance_songs(
                 self.root,
                 [row.song_id],
-                method=None if method is None else checks.key("method", method),
+                method=None if method is None else inputs.key("method", method),
                 frame_rate_hz=_rate(frame_rate_hz),
-                out=None if out is None else checks.path("out", out),
+                out=None if out is None else inputs.path("out", out),
                 progress=NoProgress,
-                pins=checks.texts("pins", pins),
-                alternatives=checks.count("alternatives", alternatives),
-                character=checks.key("character", character) if character else "",
+                pins=inputs.texts("pins", pins),
+                alternatives=inputs.count("alternatives", alternatives),
+                character=inputs.key("character", character) if character else "",
                 temperature=_temperature(temperature),
-                seed=checks.count("seed", seed, least=0),
+                seed=inputs.count("seed", seed, least=0),
             )
         if done.status == 2:
             facts = done.facts
@@ -319,11 +319,11 @@ class OpenStudio(Holdings):
         return draft_song(
             self._drafts(),
             self._song(song).song_id,
-            method=None if method is None else checks.key("method", method),
-            pins=checks.texts("pins", pins),
+            method=None if method is None else inputs.key("method", method),
+            pins=inputs.texts("pins", pins),
             frame_rate_hz=_rate(frame_rate_hz),
             temperature=_temperature(temperature),
-            seed=checks.count("seed", seed, least=0),
+            seed=inputs.count("seed", seed, least=0),
         )
 
     def propose(self, song: str | CatalogueSong, at: str | float, *, pins: Sequence[str] = ()) -> list[PinProposal]:
@@ -362,8 +362,8 @@ class OpenStudio(Holdings):
         from odori.drafts import place_pins
 
         is_seconds = isinstance(at, int | float) and not isinstance(at, bool)
-        place = f"{at:g}" if is_seconds else checks.key("at", at)
-        return place_pins(self._drafts(), self._song(song).song_id, place, pins=checks.texts("pins", pins))
+        place = f"{at:g}" if is_seconds else inputs.key("at", at)
+        return place_pins(self._drafts(), self._song(song).song_id, place, pins=inputs.texts("pins", pins))
 
     def why(self, dance: str | MadeDance | PathLike[str], time_s: float) -> FrameOrigin:
         """Say where a moment of a dance comes from, and why it was chosen.
@@ -394,7 +394,7 @@ class OpenStudio(Holdings):
         --------
         MadeDance.why
         """
-        return explain_frame(self.root, checks.key("dance", dance), time_s)
+        return explain_frame(self.root, inputs.key("dance", dance), time_s)
 
     def search(
         self,
@@ -444,15 +444,15 @@ class OpenStudio(Holdings):
         from pipelines.resources import NoProgress
 
         wish = searching.MotionQuery(
-            checks.key("clip", clip) if clip else "",
-            checks.count("k", k),
-            label=checks.texts("label", label),
-            style=checks.texts("style", style),
-            licence=checks.texts("licence", licence),
-            min_seconds=checks.number("min_seconds", min_seconds, least=0.0, most=float("inf")),
-            max_seconds=checks.number("max_seconds", max_seconds, least=0.0, most=float("inf")),
-            like=checks.texts("like", like),
-            unlike=checks.texts("unlike", unlike),
+            inputs.key("clip", clip) if clip else "",
+            inputs.count("k", k),
+            label=inputs.texts("label", label),
+            style=inputs.texts("style", style),
+            licence=inputs.texts("licence", licence),
+            min_seconds=inputs.number("min_seconds", min_seconds, least=0.0, most=float("inf")),
+            max_seconds=inputs.number("max_seconds", max_seconds, least=0.0, most=float("inf")),
+            like=inputs.texts("like", like),
+            unlike=inputs.texts("unlike", unlike),
         )
         with refused(), threadpool_limits(limits=1):
             facts = searching.search(self.root, wish, progress=NoProgress).facts
@@ -472,9 +472,9 @@ def _rate(frame_rate_hz: float | None) -> float | None:
     return (
         None
         if frame_rate_hz is None
-        else checks.number("frame_rate_hz", frame_rate_hz, least=1.0, most=checks.MOST_FRAMES_HZ)
+        else inputs.number("frame_rate_hz", frame_rate_hz, least=1.0, most=inputs.MOST_FRAMES_HZ)
     )
 
 
 def _temperature(temperature: float | None) -> float | None:
-    return None if temperature is None else checks.number("temperature", temperature, least=0.0, most=checks.WARMEST)
+    return None if temperature is None else inputs.number("temperature", temperature, least=0.0, most=inputs.WARMEST)

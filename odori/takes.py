@@ -11,7 +11,7 @@ import numpy as np
 
 from kernels.skeleton.naming import JointMapping
 from kernels.types import Clip, Float
-from odori import checks
+from odori import inputs
 from odori.answers import BeatTimes, PoseSequence
 from odori.exceptions import InputError, OdoriError, refused
 
@@ -132,7 +132,7 @@ def read(path: str | PathLike[str], *, joints: Mapping[str, str] | None = None) 
     MotionTake.canonical : on odori's 22 joints
     song_beats : of a music file
     """
-    place = checks.path("path", path)
+    place = inputs.path("path", path)
     if joints is not None and not isinstance(joints, Mapping):
         raise InputError(f"joints: want a mapping of names to odori's joints, got {joints!r}")
     suffix = place.suffix.lower()
@@ -206,7 +206,7 @@ def song_beats(path: str | PathLike[str]) -> BeatTimes:
     from assets.sources.scan import MIDI_SUFFIXES
     from odori.arrays import track_beats
 
-    place = checks.path("path", path)
+    place = inputs.path("path", path)
     if not place.is_file():
         raise OdoriError(f"{place}: want a music file, got nothing there")
     with refused():
