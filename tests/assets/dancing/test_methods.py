@@ -7,7 +7,7 @@ import pytest
 
 from assets.choreography import choreography
 from assets.dancing.asked import Direction
-from assets.dancing.method import DanceOrder
+from assets.dancing.method import DanceOrder, Method
 from assets.dancing.methods import ALTERNATIVES, METHODS, USUAL, check_order
 from assets.dancing.refusal import RefusalError
 from assets.partitions import SESSION_TABLES
@@ -61,3 +61,12 @@ def test_a_method_that_keeps_no_pins_refuses_them_and_names_those_that_do():
         check_order(METHODS["matching"], "waltz", order("1=spin").direction)
     check_order(METHODS["matching"], "waltz", order().direction)
     check_order(METHODS["graph"], "waltz", order("1=spin").direction)
+
+
+def test_alternatives_are_the_second_to_fifth_of_the_methods_that_have_them():
+    assert ALTERNATIVES == ("graph_2", "graph_3", "graph_4", "graph_5")
+
+
+def test_a_method_draws_learns_and_has_alternatives_only_where_it_says_so():
+    plain = Method(name="plain", version="1", inputs=(), settings=(), choose=lambda inputs, order: None)
+    assert (plain.keeps_pins, plain.has_alternatives, plain.draws, plain.learns) == (True, False, False, False)

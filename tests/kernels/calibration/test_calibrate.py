@@ -65,3 +65,10 @@ def test_other_sensors_are_refused(cleaned):
     fewer = replace(cleaned, recording=replace(cleaned.recording, sensors=(*SENSORS[:-1], "tail")))
     with pytest.raises(ValueError, match="sensors: want pelvis"):
         calibrate(fewer)
+
+
+def test_every_joint_tells_how_far_it_moved(cleaned):
+    """Elbows and knees about one axis at least; the range is none of a joint that never moved alone."""
+    for joint in calibrate(cleaned).joints:
+        assert np.isfinite(joint.range_of_motion_rad).all(), joint.joint
+        assert joint.range_of_motion_rad.max() > 0.1, joint.joint

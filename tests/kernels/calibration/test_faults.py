@@ -51,3 +51,12 @@ def test_a_misspelt_sensor_is_offered_for_the_missing_one():
 def test_nothing_but_missing_entries(made):
     nothing = replace(made.recording, is_valid=np.zeros_like(made.recording.is_valid))
     assert {one.severity for one in check_recording(nothing)} == {"error"}
+
+
+@pytest.mark.parametrize(("length", "severity"), [(1.0005, None), (1.005, "warning"), (1.05, "error")])
+def test_a_quaternion_a_little_off_is_made_unit_and_one_far_off_is_an_error(made, length, severity):
+    rotation = made.recording.rotation_wxyz.copy()
+    rotation[100, 3] *= length
+    found = [one for one in check_recording(replace(made.recording, rotation_wxyz=rotation)) if "unit" in one.sentence]
+    assert [one.severity for one in found] == ([] if severity is None else [severity])
+    assert all(f"got one of length {length:.4f} at frame 100" in one.sentence for one in found)

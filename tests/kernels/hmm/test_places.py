@@ -100,3 +100,7 @@ def test_what_is_danced_in_place_of_a_wish_costs_by_the_interval():
     wishes = [MotionWish(1, 4, even), MotionWish(0, 3, low)]
     np.testing.assert_array_equal(unkept_cost(wishes, start, length, motion, price=0.5), [0.5, 1.0 + 0.5, 0.0])
     np.testing.assert_array_equal(unkept_cost([], start, length, motion, price=0.5), np.zeros(3))
+
+
+def test_without_wishes_nothing_is_unkept():
+    assert unkept_cost([], np.array([0, 2]), np.array([2, 1]), np.array([0, 1]), price=1.0).tolist() == [0.0, 0.0]

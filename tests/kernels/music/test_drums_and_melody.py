@@ -8,6 +8,7 @@ from kernels.music.drums_and_melody import (
     CONTOUR,
     FIRST_KEY,
     HIGH,
+    KIT_KEYS,
     LOW,
     MIDDLE,
     N_KEYS,
@@ -186,3 +187,15 @@ def test_every_sound_a_pad_becomes_is_one_of_general_midi():
     assert not set(NEAREST_KEY) & set(range(FIRST_KEY, FIRST_KEY + N_KEYS))
     assert set(BAND_OF_KEY.tolist()) == {LOW, MIDDLE, HIGH}
     assert [int(BAND_OF_KEY[key - FIRST_KEY]) for key in (LOW, MIDDLE, HIGH)] == [LOW, MIDDLE, HIGH]
+
+
+@pytest.mark.parametrize(
+    ("key", "band"), [(36, LOW), (41, LOW), (38, MIDDLE), (60, MIDDLE), (42, HIGH), (53, HIGH), (81, HIGH)]
+)
+def test_bass_drums_are_low_cymbals_high_and_the_rest_between(key, band):
+    assert BAND_OF_KEY[key - FIRST_KEY] == band
+
+
+def test_pads_of_a_kit_are_its_drums_and_cymbals_and_no_percussion():
+    assert {22, 26, 36, 38, 42, 46, 49, 51, 53, 58} <= KIT_KEYS  # the bell of the ride among them
+    assert not {35, 54, 56, 60, 69} & KIT_KEYS  # tambourine, cowbell, bongo, cabasa
