@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,6 @@ from kernels.types import Float
 from odori import inputs
 from odori.answers import BeatTimes
 from odori.exceptions import InputError, refused
-
-SLOWEST_RATE_HZ, FASTEST_RATE_HZ = 4_000.0, 768_000.0
-"""Sample rates of sound that beats are looked for in, hertz: those of :mod:`assets.formats.audio`."""
 
 LOUDEST = 16.0
 """Largest sample, full scale 1. Chosen by hand, between decoded sound, which stays near 1, and unscaled integers."""
@@ -46,7 +44,8 @@ def track_beats(samples: ArrayLike, rate_hz: float) -> BeatTimes:
     Raises
     ------
     InputError
-        If samples have another shape, are transposed, (C, n), not finite, none, or integers; or the rate is none.
+        If samples have another shape, are transposed, (C, n), not finite, empty, or integers; or the rate is too low or
+        too high.
 
     Examples
     --------
@@ -72,13 +71,13 @@ def track_beats(samples: ArrayLike, rate_hz: float) -> BeatTimes:
     score_beats : how well they agree with others
     kernels.music.beats.track_beats : with candidates of tempo
     """
+    from assets.formats.audio import FASTEST_HZ, SLOWEST_HZ
+
     sound = _samples(samples)
     rate = _number("rate_hz", rate_hz)
-    if not SLOWEST_RATE_HZ <= rate <= FASTEST_RATE_HZ:
-        hint = "; was it given in kHz?" if SLOWEST_RATE_HZ <= 1000 * rate <= FASTEST_RATE_HZ else ""
-        raise InputError(
-            f"rate_hz: want samples a second, {SLOWEST_RATE_HZ:.0f} to {FASTEST_RATE_HZ:.0f}, got {rate_hz}{hint}"
-        )
+    if not SLOWEST_HZ <= rate <= FASTEST_HZ:
+        hint = "; was it given in kHz?" if SLOWEST_HZ <= 1000 * rate <= FASTEST_HZ else ""
+        raise InputError(f"rate_hz: want samples a second, {SLOWEST_HZ:.0f} to {FASTEST_HZ:.0f}, got {rate_hz}{hint}")
     from kernels.music.beats import track_beats as track
 
     with refused():
@@ -227,7 +226,7 @@ def match(
     Raises
     ------
     InputError
-        If an array is not one-dimensional, empty, negative or not finite, k is not >= 1, or the device is none.
+        If an array is not one-dimensional, empty, negative or not finite, k is not >= 1, or there is no such device.
 
     Notes
     -----
@@ -290,7 +289,7 @@ def match(
     ]
 
 
-def _matcher(device: str):  # type: ignore[no-untyped-def]  # noqa: ANN202 - a SegmentMatcher; its home loads Dagster
+def _matcher(device: str) -> Any:  # noqa: ANN401 - a SegmentMatcher; its home loads Dagster
     if device == "reference":
         from kernels.matching.numpy_search import NumpyMatcher
 
@@ -369,11 +368,9 @@ def _check_finite(name: str, values: NDArray[np.floating]) -> None:
         raise InputError(f"{name}: want finite values, got {values[at]} at {at[0] if len(at) == 1 else at}")
 
 
-def _number(name: str, value: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: want a number, got {value!r}") from error
-    if not np.isfinite(number):
+def _number(name: str, value: Any) -> float:  # noqa: ANN401 - whatever was given
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InputError(f"{name}: want a number, got {value!r}")
+    if not np.isfinite(float(value)):
         raise InputError(f"{name}: want a finite number, got {value}")
-    return number
+    return float(value)

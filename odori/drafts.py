@@ -16,15 +16,14 @@ from assets.dancing.asked import direction_of
 from assets.dancing.assembled import assemble_steps
 from assets.dancing.method import DanceOrder
 from assets.dancing.methods import METHODS, USUAL, check_order
-from assets.sources.sources import brief_of
 from assets.tables.choreography import from_choreography, from_dance_pose, to_choreography
 from assets.tables.music import to_music_beat
 from odori.exceptions import DanceRefusedError, OdoriError, refused
 from odori.made_dances import Draft, PinProposal, dance_poses
 from pipelines.studio.folder import StudioFolder
 from pipelines.studio.inventory import songs_found
-from pipelines.studio.stored import RememberedTable, TableMemory
-from schemas.catalog import TABLES
+from pipelines.studio.stored import RememberedTable, TableMemory, partitions_for
+from schemas.settings import Brief
 
 
 class DraftRoom:
@@ -48,10 +47,7 @@ class DraftRoom:
         song : key; of tables of songs its partition alone
         """
         lake = self.folder.lake
-        keys = ["" if key == "all" else key for key in lake.keys(name)]
-        if TABLES[name].key[0] == "song_id":
-            keys = [key for key in keys if key == song]
-        return RememberedTable(lake, name, keys, self._memory)
+        return RememberedTable(lake, name, partitions_for(lake, name, song), self._memory)
 
     def lacks(self, names: Sequence[str], song: str) -> list[str]:
         """Name the tables of which nothing is stored.
@@ -90,8 +86,8 @@ def draft_song(
     with refused(), threadpool_limits(limits=1):
         studio = room.folder
         settings = studio.settings()
-        _check_readable(room, song)
-        way = method or brief_of(studio, song).method
+        brief = _readable_brief(room, song)
+        way = method or brief.method
         if way not in METHODS:
             raise OdoriError(f"method: want one of {', '.join(METHODS)}, got {way!r}")
         chosen = METHODS[way]
@@ -101,7 +97,7 @@ def draft_song(
         _make_where_lacking(room, names, song, way)
         beats = to_music_beat(room.stored("music_beat", song).read(song))
         if len(beats.time_s) < 2:
-            raise OdoriError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
+            raise DanceRefusedError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
         duration_s = float(max(room.stored("song", song).read(song)["duration_s"].to_pylist()))
         order = DanceOrder(song, beats, duration_s, settings, asked, temperature, seed)
         danced = chosen.choose({name: room.stored(name, song) for name in chosen.inputs}, order)
@@ -132,7 +128,7 @@ def place_pins(room: DraftRoom, song: str, place: str, *, pins: Sequence[str] = 
         As there.
     """
     with refused(), threadpool_limits(limits=1):
-        _check_readable(room, song)
+        _readable_brief(room, song)
         _make_where_lacking(room, proposals.INPUTS, song, USUAL)
         inputs = {name: room.stored(name, song) for name in proposals.INPUTS}
         texts = _without_likeness(room.folder, pins)
@@ -153,13 +149,14 @@ def place_pins(room: DraftRoom, song: str, place: str, *, pins: Sequence[str] = 
     return sorted(found, key=lambda p: (not p.is_within_reach, p.steps_outside_warp_bounds, p.extra_cost))
 
 
-def _check_readable(room: DraftRoom, song: str) -> None:
-    """Refuse a song whose file or brief was refused, by its own reason."""
+def _readable_brief(room: DraftRoom, song: str) -> Brief:
+    """Read a song's brief; a song whose file or brief is refused is refused by its own reason."""
     sources = room.folder.sources()
-    room.folder.brief(sources.song(song))
+    brief = room.folder.brief(sources.song(song))
     for file in songs_found(sources, room.folder.lake):
         if file["key"] == song and file["reason"]:
             raise OdoriError(f"{song}: it was refused: {file['reason']}")
+    return brief
 
 
 def _make_where_lacking(room: DraftRoom, names: Sequence[str], song: str, method: str) -> None:

@@ -66,7 +66,7 @@ class Holdings:
         """
         with refused():
             rows = inventory.clip_rows(self._folder.lake)
-            files, _ = inventory.clips_and_doubts(self._folder.sources(), self._folder.lake)
+            files, _ = inventory.clips_and_doubts(self._folder.sources(), self._folder.lake, rows)
         found = [
             CatalogueClip(
                 file["key"],
@@ -104,7 +104,7 @@ class Holdings:
         """
         with refused():
             rows = inventory.song_rows(self._folder.lake)
-            files = inventory.songs_found(self._folder.sources(), self._folder.lake)
+            files = inventory.songs_found(self._folder.sources(), self._folder.lake, rows)
         found = [
             CatalogueSong(
                 file["key"],
@@ -172,7 +172,7 @@ class Holdings:
                 if wanted not in self._folder.lake.keys(name):
                     raise OdoriError(f"{name}: want a partition that is stored, {wanted!r} is not built")
                 return self._folder.lake.table(name, wanted)
-            parts = [self._folder.lake.table(name, one) for one in self._keys(name)]
+            parts = [self._folder.lake.table(name, one) for one in self._folder.lake.keys(name)]
             return concat(TABLES[name], parts)
 
     def polars(self, name: str, *, key: str | None = None) -> pl.DataFrame:
@@ -269,7 +269,7 @@ class Holdings:
         import polars as pl
 
         self._known(name)
-        paths = [self._folder.lake.path(name, key) for key in self._keys(name)]
+        paths = [self._folder.lake.path(name, key) for key in self._folder.lake.keys(name)]
         if not paths:
             raise OdoriError(f"{name}: nothing of it is stored; build the studio, or dance a song")
         return pl.scan_parquet([str(path) for path in paths], glob=False)
@@ -363,9 +363,6 @@ class Holdings:
     def _known(self, name: str) -> None:
         if not isinstance(name, str) or name not in TABLES:
             raise OdoriError(f"{name}: want a table, got none of that name; they are {', '.join(sorted(TABLES))}")
-
-    def _keys(self, name: str) -> list[str]:
-        return ["" if key == "all" else key for key in self._folder.lake.keys(name)]
 
 
 def _told(row: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -230,7 +230,7 @@ class OpenStudio(Holdings):
         DanceRefusedError
             If the pins cannot all be kept (``conflict``, ``ways_out``), or there is nothing to dance.
         OdoriError
-            If the song, the method or a pin is none.
+            If there is no such song, method or pin.
 
         Examples
         --------
@@ -345,7 +345,7 @@ class OpenStudio(Holdings):
         DanceRefusedError
             If the pins that are given cannot be kept.
         OdoriError
-            If the song or the place is none.
+            If there is no such song or place.
 
         Examples
         --------
@@ -427,7 +427,7 @@ class OpenStudio(Holdings):
         Raises
         ------
         OdoriError
-            If the motion is none, or a filter names what no clip has.
+            If there is no such motion, or a filter names what no clip has.
 
         Examples
         --------

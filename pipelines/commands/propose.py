@@ -12,8 +12,7 @@ from pipelines.commands.outcome import DONE, NOTHING_DONE, Outcome
 from pipelines.commands.session import Session
 from pipelines.studio.files import LakeError, StudioError
 from pipelines.studio.folder import StudioFolder, existing
-from pipelines.studio.stored import StoredTable
-from schemas.catalog import TABLES
+from pipelines.studio.stored import StoredTable, partitions_for
 
 LONGEST_TABLE = 12
 """Rows of candidates. Chosen by hand, to fit on a screen."""
@@ -34,7 +33,8 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
     StudioError
         If the place is none of the song's.
     """
-    inputs = {name: _stored(studio, name, song) for name in proposals.INPUTS}
+    lake = studio.lake
+    inputs = {name: StoredTable(lake, name, partitions_for(lake, name, song)) for name in proposals.INPUTS}
     try:
         facts = proposals.propose_at(inputs, studio, song, place, pins=pins)
     except proposals.PlaceError as error:
@@ -46,11 +46,6 @@ def priced(studio: StudioFolder, song: str, place: str, pins: Sequence[str]) -> 
         trouble = f"{song}: cannot be danced at all with the clips that 'allow' admits; 'odori dance' says why"
         return Outcome(NOTHING_DONE, {"error": trouble}, troubles=[trouble])
     return Outcome(DONE, facts, _report(facts))
-
-
-def _stored(studio: StudioFolder, name: str, song: str) -> StoredTable:
-    is_of_songs = TABLES[name].key[0] == "song_id"
-    return StoredTable(studio.lake, name, [song] if is_of_songs else studio.lake.keys(name))
 
 
 def _report(facts: Mapping[str, Any]) -> str:

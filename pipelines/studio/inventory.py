@@ -12,13 +12,16 @@ from schemas.music import SONG
 _NO_POSE = content_version(CANONICAL_POSE.empty())
 
 
-def clips_and_doubts(sources: Sources, lake: Lake) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+def clips_and_doubts(
+    sources: Sources, lake: Lake, stored: Mapping[str, Mapping[str, Any]] | None = None
+) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
     """List the motion files with their states, and what is doubtful about those that were read.
 
     Parameters
     ----------
     sources : as found now
     lake : what earlier builds made of them
+    stored : :func:`clip_rows` of the lake, where they were read already
 
     Returns
     -------
@@ -26,7 +29,7 @@ def clips_and_doubts(sources: Sources, lake: Lake) -> tuple[list[dict[str, Any]]
         The state is "new" before a file was looked at, "changed" where it was since.
     doubts : ``path`` and ``warning``
     """
-    stored = clip_rows(lake)
+    stored = clip_rows(lake) if stored is None else stored
     unplaced = {session: _unplaced(lake, session) for session in lake.keys("canonical_pose")}
     found: list[dict[str, Any]] = []
     doubts: list[dict[str, str]] = []
@@ -63,15 +66,18 @@ def _unplaced(lake: Lake, session: str) -> set[str]:
     return {clip for clip, made in stamp.clips.items() if made.content == _NO_POSE} if stamp else set()
 
 
-def songs_found(sources: Sources, lake: Lake) -> list[dict[str, Any]]:
+def songs_found(
+    sources: Sources, lake: Lake, stored: Mapping[str, Mapping[str, Any]] | None = None
+) -> list[dict[str, Any]]:
     """List every music file with its state, as :func:`clips_and_doubts`.
 
     Parameters
     ----------
     sources : as found now
     lake : what earlier builds made of them
+    stored : :func:`song_rows` of the lake, where they were read already
     """
-    stored = song_rows(lake)
+    stored = song_rows(lake) if stored is None else stored
     found = []
     for song in sources.songs:
         path = song.path.encode("utf-8", "backslashreplace").decode()

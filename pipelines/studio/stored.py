@@ -8,6 +8,7 @@ import pyarrow as pa
 from assets.stamps import Stamp
 from pipelines.studio.files import LakeError
 from pipelines.studio.lake import Lake
+from schemas.catalog import TABLES
 
 
 class StoredTable:
@@ -47,6 +48,24 @@ class StoredTable:
         if stamp is None:
             raise LakeError(f"{self._asset}: the partition {key!r} is not built; run 'odori build'")
         return stamp
+
+
+def partitions_for(lake: Lake, asset: str, song: str) -> list[str]:
+    """Name the stored partitions of a table that a dance of a song is chosen from.
+
+    Parameters
+    ----------
+    lake : Lake
+    asset : name of the table
+    song : key
+
+    Returns
+    -------
+    list of str
+        Of tables of songs the song's own, of others all; empty where none is stored.
+    """
+    is_of_songs = TABLES[asset].key[0] == "song_id"
+    return [key for key in lake.keys(asset) if key == song or not is_of_songs]
 
 
 REMEMBERED_BYTES = 2**29

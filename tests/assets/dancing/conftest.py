@@ -30,6 +30,12 @@ class _InMemory:
 
 
 @pytest.fixture(scope="session")
+def in_memory():
+    """Hold the poses of clips, tables by name, as the lake would."""
+    return _InMemory
+
+
+@pytest.fixture(scope="session")
 def stored_poses():
     """Store clips whose left arm is raised to given angles, by name: (F,) radians, or with the hips' way (F, 3)."""
 

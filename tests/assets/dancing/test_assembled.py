@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from assets.dancing.assembled import assemble_steps
-from assets.stamps import ClipStamp, Stamp
 from assets.tables.motion import from_canonical_pose
 from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget
@@ -15,30 +14,13 @@ from kernels.types import Choreography
 from schemas.settings import DanceSettings
 
 
-class Held:
-    """One session of two clips, held in memory."""
-
-    keys = ("all",)
-
-    def __init__(self, tables):
-        self._tables = tables
-
-    def stamp(self, key):
-        return Stamp("1", "", {}, "", {clip: ClipStamp("", "") for clip in self._tables})
-
-    def read(self, key, *, clip_ids=None):
-        import pyarrow as pa
-
-        return pa.concat_tables([self._tables[clip] for clip in sorted(clip_ids)])
-
-
 @pytest.fixture(scope="module")
-def poses():
+def poses(in_memory):
     tables = {}
     for label in ("step", "kick"):
         clip = take(label, n_beats=8, interval_s=0.5).clip
         tables[label] = from_canonical_pose(label, clip.frame_rate_hz, retarget(clip, map_joints(clip.skeleton)))
-    return Held(tables)
+    return in_memory(tables)
 
 
 @pytest.fixture

@@ -1,16 +1,12 @@
 """Poses of clips on the beats of a song, at its very start and end, and as a finished dance shows them."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import polars as pl
-import pyarrow as pa
 import pytest
 
 from assets.dancing.pose_pins import ClipPoses, moment_of, shown_pose, to_pose_pins
 from assets.dancing.wishes import DirectionError
 from assets.reading.songs import PlayedSong
-from assets.stamps import ClipStamp, Stamp
 from assets.tables.motion import CanonicalClip, from_canonical_pose
 from kernels.graph.costs import PathCosts
 from kernels.graph.nodes import beat_nodes
@@ -23,23 +19,6 @@ from schemas.pins import parse_pin
 
 RATE_HZ, N_FRAMES = 30.0, 151
 ONE, TWO, HALF = (STEPS.index(step) for step in ((1, 1), (2, 1), (1, 2)))
-
-
-@dataclass(frozen=True)
-class InMemory:
-    """Canonical poses of one session, by clip."""
-
-    rows: dict[str, pa.Table]
-
-    @property
-    def keys(self):
-        return ["day"]
-
-    def read(self, key="", *, clip_ids=None):
-        return pa.concat_tables([rows for clip, rows in self.rows.items() if clip_ids is None or clip in clip_ids])
-
-    def stamp(self, key=""):
-        return Stamp("1", "", {}, "", {clip: ClipStamp("", "") for clip in self.rows})
 
 
 def swinging(amplitude_rad, turns_hz):
@@ -58,11 +37,11 @@ CLIPS = {"day-a": (1.2, 0.31), "day-b": (1.2, 0.23), "day-c": (0.02, 0.5)}
 
 
 @pytest.fixture(scope="module")
-def poses():
+def poses(in_memory):
     rows = {}
     for name, how in CLIPS.items():
         rows[name] = from_canonical_pose(name, RATE_HZ, CanonicalClip(name, RATE_HZ, *swinging(*how)))
-    return ClipPoses(InMemory(rows))
+    return ClipPoses(in_memory(rows))
 
 
 @pytest.fixture(scope="module")

@@ -16,20 +16,9 @@ from assets.tables.motion import (
 from kernels.motion.motion_beats import motion_beats
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.naming import map_joints
-from kernels.skeleton.retarget import retarget
 from kernels.synthetic.dancer import place, take
 from kernels.types import Clip
 from schemas.motion import CANONICAL_POSE, POSE
-
-
-@pytest.fixture(scope="module")
-def clip():
-    return take("step", n_beats=4).clip
-
-
-@pytest.fixture(scope="module")
-def canonical(clip):
-    return retarget(clip, map_joints(CANONICAL))
 
 
 def stored(table, path):

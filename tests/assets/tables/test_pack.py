@@ -10,22 +10,8 @@ from assets.tables.motion import (
     from_pose,
     to_canonical_poses,
 )
-from kernels.skeleton.canonical import CANONICAL
-from kernels.skeleton.naming import map_joints
-from kernels.skeleton.retarget import retarget
-from kernels.synthetic.dancer import take
 from kernels.types import Clip
 from schemas.motion import CANONICAL_POSE, POSE, SKELETON
-
-
-@pytest.fixture(scope="module")
-def clip():
-    return take("step", n_beats=4).clip
-
-
-@pytest.fixture(scope="module")
-def canonical(clip):
-    return retarget(clip, map_joints(CANONICAL))
 
 
 def test_clips_of_one_table_are_split_and_slices_unpack(canonical):
