@@ -124,6 +124,7 @@ def spanning_tree(cost: Float) -> list[tuple[int, int]]:
     Returns
     -------
     list of S - 1 pairs of indices, smaller first, sorted
+        Of equal pairs, the one with the sensor that was joined first.
     """
     s = len(cost)
     is_in: NDArray[np.bool_] = np.arange(s) == 0

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.calibration.body_faults import _loose, _movement, find_body_faults, move_to_repeat
+from kernels.calibration.body_faults import _loose, _movement, _sides, find_body_faults, move_to_repeat
 from kernels.calibration.cleaning import clean
 from kernels.calibration.joints import PairSolution, solve_joints
-from kernels.calibration.records import JOINTS, SENSORS
+from kernels.calibration.records import JOINTS, PARENT, SENSORS, Cleaned, Recording
 from kernels.synthetic import suit_performer
 
 
@@ -136,3 +136,41 @@ def test_enough_movement_in_enough_frames_is_not_told():
 def test_a_loose_sensor_is_doubtful_and_a_strange_one_wrong(sigma_m, severity):
     assert [found for found, _, _ in told(_loose, sigma_m=sigma_m)] == ([] if severity is None else [severity])
     assert told(_loose, sigma_m=np.inf, n_good=0) == []  # where no frame is good nothing is known of it
+
+
+def test_frames_with_a_filled_sensor_tell_nothing_where_others_are_enough(cleaned, pairs):
+    """Two sensors change places in half of the frames: nothing is said of it as long as those frames were filled."""
+    one, other = SENSORS.index("pelvis"), SENSORS.index("r_foot")
+    recording = cleaned.recording
+    position, turned = recording.position_xyz_m.copy(), recording.rotation_wxyz.copy()
+    for values in (position, turned):
+        values[:1500, [one, other]] = values[:1500, [other, one]]
+    is_filled = cleaned.is_filled.copy()
+    is_filled[:1500, SENSORS.index("head")] = True
+    spoilt = replace(recording, position_xyz_m=position, rotation_wxyz=turned)
+    assert find_body_faults(replace(cleaned, recording=spoilt, is_filled=is_filled), pairs) == ()
+
+
+def on_legs(n_forwards):
+    """Cleaned, of ten frames and upright sensors, with both knees bent forwards in some; joints from their sensors."""
+    joint = {name: np.zeros(3) for name in JOINTS}
+    joint |= {"l_thigh": np.array([0.1, 0.9, 0.0]), "r_thigh": np.array([-0.1, 0.9, 0.0])}
+    joint |= {"l_upper_arm": np.array([0.2, 1.4, 0.0]), "r_upper_arm": np.array([-0.2, 1.4, 0.0])}
+    joint |= {"l_shank": np.array([0.1, 0.5, 0.0]), "r_shank": np.array([-0.1, 0.5, 0.0])}
+    joint |= {"l_foot": np.array([0.1, 0.1, -0.3]), "r_foot": np.array([-0.1, 0.1, -0.3])}
+    position = np.tile(np.linspace(-0.5, 0.5, len(SENSORS))[:, None] * [1.0, 0.5, 0.0], (10, 1, 1))
+    pairs = [replace(moved(), in_parent_m=joint[name] - position[0, PARENT[SENSORS.index(name)]]) for name in JOINTS]
+    for name in ("l_shank", "r_shank"):  # the foot goes with it
+        position[:n_forwards, SENSORS.index(name), 2] += 0.6
+    turned = np.tile(rotation.IDENTITY, (10, len(SENSORS), 1))
+    is_valid = np.ones((10, len(SENSORS)), bool)
+    nothing = np.zeros(len(SENSORS))
+    recording = Recording(100.0, SENSORS, position, turned, is_valid)
+    return Cleaned(recording, ~is_valid, nothing, nothing, 1.0, nothing.astype(np.int64)), pairs
+
+
+@pytest.mark.parametrize(("n_forwards", "sensors"), [(0, []), (6, []), (7, ["l_shoulder"]), (10, ["l_shoulder"])])
+def test_knees_that_bend_forwards_now_and_then_are_no_exchanged_legs(n_forwards, sensors):
+    found = _sides(*on_legs(n_forwards), np.arange(10))
+    assert [one.sensor for one in found] == sensors
+    assert all("both knees bending forwards, arms and legs alike" in one.sentence for one in found)

@@ -58,6 +58,19 @@ def test_directions_that_are_not_seen_stay():
     assert np.abs(in_parent).max() < 0.6
 
 
-def test_no_steps_and_no_frames_change_nothing(cleaned, pairs):
+def test_no_steps_change_nothing(cleaned, pairs):
     for got, expected in zip(adjust(cleaned, pairs, steps=0), apart(pairs), strict=True):
+        np.testing.assert_array_equal(got, expected)
+
+
+def test_without_a_frame_joints_stay_as_solved_one_by_one(cleaned, pairs):
+    recording = cleaned.recording
+    none = replace(
+        recording,
+        position_xyz_m=recording.position_xyz_m[:0],
+        rotation_wxyz=recording.rotation_wxyz[:0],
+        is_valid=recording.is_valid[:0],
+    )
+    nothing = replace(cleaned, recording=none, is_filled=cleaned.is_filled[:0])
+    for got, expected in zip(adjust(nothing, pairs), apart(pairs), strict=True):
         np.testing.assert_array_equal(got, expected)

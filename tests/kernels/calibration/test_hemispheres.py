@@ -115,3 +115,11 @@ def test_a_jump_that_noise_makes_shorter_for_one_step_is_still_one():
     place[[29, 30], 0] = [0.07, -0.07]
     mended, _ = turned_back(around(place))
     assert (mended[:, 3] != place).any(axis=1).sum() == 30
+
+
+def test_a_jump_as_soon_as_a_median_can_be_taken_is_one():
+    place = np.tile([-0.1, 1.0, 0.0], (60, 1))
+    place[7:] *= -1
+    mended, found = turned_back(around(place))
+    np.testing.assert_array_equal(mended[:, 3], np.tile([0.1, -1.0, 0.0], (60, 1)))
+    assert [one.frame_index for one in found] == [0]

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from kernels.calibration.poses import body_model, gaps, to_stream
-from kernels.calibration.springs import relax_frame, relax_springs, spring_body
-from kernels.calibration.tree_solver import Stream
+from kernels.calibration.springs import END_STIFFNESS, HOLD_STIFFNESS, relax_frame, relax_springs, spring_body
+from kernels.calibration.tree_solver import BodyModel, Stream
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +61,16 @@ def test_no_frames_and_no_iterations(calibration):
     assert relax_springs(model, none).position_xyz_m.shape == (0, 17, 3)
     with pytest.raises(ValueError, match="iterations"):
         relax_springs(model, none, iterations=0)
+
+
+def test_bones_are_weighed_about_the_mean_of_their_joints():
+    """A root between two joints has none of its own; the next bone lies between its own joint and the one below."""
+    offset = np.array([[0.0, 0.0, 0.0], [0.3, 0.1, 0.0], [-0.1, 0.1, 0.0], [0.0, 0.4, 0.0]])
+    sensor = np.array([[0.0, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, -0.2, 0.0], [0.0, 0.02, 0.0]])
+    body = spring_body(BodyModel((-1, 0, 0, 1), sensor, offset, np.ones(4), np.ones(4)))
+    centre = np.array([[0.1, 0.1, 0.0], [0.0, 0.2, 0.0], [0.0, -0.1, 0.0], [0.0, 0.01, 0.0]])
+    np.testing.assert_allclose(body.proximal_m, -centre)
+    np.testing.assert_allclose(body.sensor_m, sensor - centre)
+    np.testing.assert_allclose(body.attachment_m[1:], offset[1:] - centre[[0, 0, 1]])
+    np.testing.assert_allclose(body.turnability, 1 / np.array([0.08, 0.08, 0.02, 0.002]))
+    assert (body.hold == [HOLD_STIFFNESS, HOLD_STIFFNESS, END_STIFFNESS, END_STIFFNESS]).all()

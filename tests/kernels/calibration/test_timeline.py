@@ -188,3 +188,17 @@ def test_a_sensor_heard_once_is_not_on_an_uneven_grid():
     is_valid = np.array([[True], [False], [False], [False]])
     turned = np.tile(rotation.IDENTITY, (4, 1, 1))
     assert not onto_grid(line, time_s, np.zeros((4, 1, 3)), turned, is_valid)[2].any()
+
+
+def test_where_the_opener_falls_silent_another_opens_the_round_when_it_speaks_again():
+    """Stations a, then b, of sixty samples; a is waited for, and says nothing new in two of them."""
+    a, b = np.repeat(np.arange(1.0, 61.0), 2), np.repeat(np.arange(1.0, 61.0), 2)
+    b = np.concatenate([[0.0], b[:-1]])
+    a[60:64] = a[59]
+    time_s = np.repeat(np.arange(60) / 100, 2) + np.tile([0, 1e-4], 60)
+    seen = collapse(time_s, np.stack([a, b], 1)[..., None])
+    expected = np.arange(0, 120, 2)
+    expected[[30, 31]] += 1
+    np.testing.assert_array_equal(seen.arrived_row, expected)
+    assert np.flatnonzero(~seen.is_new[:, 0]).tolist() == [30, 31]
+    assert seen.is_new[:, 1].all()
