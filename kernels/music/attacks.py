@@ -54,8 +54,8 @@ def attack_strength(samples: Samples, sample_rate_hz: float, centre_s: Float, *,
     Returns
     -------
     (B, 2 n + 1) float64, >= 0
-        Summed rise of the square roots of 24 bands over 4 ms, in n steps of 2 ms from ``reach_s`` before to as much
-        after; less where the sound as a whole does not grow over 20 ms.
+        Summed rise of the square roots of 24 bands, up to 10 kHz or half the rate, over 4 ms, in n steps of 2 ms from
+        ``reach_s`` before to as much after; less where the sound as a whole does not grow over 20 ms.
 
     Raises
     ------

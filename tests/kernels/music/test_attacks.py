@@ -95,3 +95,13 @@ def test_attacks_are_looked_for_around_each_beat_alone():
     assert strength[0].max() < 1e-3 * strength[1].max()
     assert attack_strength(train.samples, 22050, np.zeros(0), reach_s=0.04).shape == (0, 41)
     assert attack_strength(train.samples, 22050, np.array([0.5]), reach_s=0.0).shape == (1, 1)
+
+
+@pytest.mark.parametrize(("hertz", "is_heard"), [(1000, True), (9000, True), (15000, False)])
+def test_attacks_are_heard_up_to_10_khz(hertz, is_heard):
+    """A tone that swells within 5 ms, so that it is heard at its own pitch alone."""
+    time_s = np.arange(44100) / 44100
+    swell = np.sin(np.pi / 2 * np.clip((time_s - 0.4) / 0.005, 0, 1)) ** 2
+    strength = attack_strength(swell * np.sin(2 * np.pi * hertz * time_s), 44100, np.array([0.4]), reach_s=0.03).max()
+    usual = attack_strength(swell * np.sin(2 * np.pi * 3000 * time_s), 44100, np.array([0.4]), reach_s=0.03).max()
+    assert (strength > 0.4 * usual) == is_heard

@@ -134,3 +134,9 @@ def test_a_song_told_longer_than_its_sound_goes_on_at_its_last_level():
     assert (found.intensity[125:] == found.intensity[124]).all()
     assert found.intensity[-1] > 0
     assert found.time_s[-1] == 1.5
+
+
+def test_the_frame_after_the_last_is_no_part_of_the_song():
+    onset = np.array([0.0, 1.0, 0.0, 4.0])
+    found = gather(onset, np.array([0.1, 0.3, 0.4, -0.1]), rate_hz=10.0, reach_s=0.0)
+    np.testing.assert_array_equal(found, [1, 4, 0, 0])

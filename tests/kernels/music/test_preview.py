@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kernels.music.notes import sorted_notes
-from kernels.music.preview import DRUMS, VOICES, play, render_preview
+from kernels.music.preview import DRUMS, VOICES, Voice, play, render_preview
 
 RATE = 22050
 
@@ -77,3 +77,18 @@ def test_refusals():
         render_preview(sorted_notes([(0.0, 0.1, 60, 90, 1, 0)]), sample_rate_hz=100)
     with pytest.raises(ValueError, match="voices"):
         play(sorted_notes([]), sample_rate_hz=RATE, voices=VOICES[:3], kit={})
+
+
+def test_even_harmonics_keep_their_share_and_all_fall_with_their_number():
+    voice = Voice(1.0, 0.5, 0.001, 1.0, 1.0, 0.01, 1.0)
+    notes = sorted_notes([(0.0, 1.2, 69, 127, 1, 0)])
+    sound = play(notes, sample_rate_hz=RATE, voices=[voice] * 16, kit={})
+    held = np.abs(np.fft.rfft(sound[2205 : 2205 + RATE]))  # a second: each bin is 1 Hz
+    np.testing.assert_allclose(held[[880, 1320, 1760]] / held[440], [0.5 / 2, 1 / 3, 0.5 / 4], rtol=0.02)
+
+
+def test_the_least_rate_is_8000():
+    notes = sorted_notes([(0.0, 0.1, 60, 90, 1, 0)])
+    assert np.abs(render_preview(notes, sample_rate_hz=8000)).max() > 0.01
+    with pytest.raises(ValueError, match="want >= 8000, got 7999"):
+        render_preview(notes, sample_rate_hz=7999)
