@@ -90,3 +90,9 @@ def test_room_grows_with_both(full):
     count = np.array([10, 20])
     assert np.diff(room(full[0], count)).tolist() == [10]
     assert (room(full[0], count) > room(full[0][:30], count)).all()
+
+
+def test_copies_beyond_the_nearest_eight_are_laid_at_other_paces_too(full, thin):
+    query = full[1][np.rint(np.arange(0, 180, 1.22)).astype(int)]
+    found = align(query, [thin[1]] * 12)
+    assert max(one.distance_m for one in found) < 0.02

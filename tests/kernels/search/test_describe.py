@@ -5,6 +5,7 @@ import pytest
 
 from kernels.search.describe import N_STATISTICS, describe
 from kernels.search.normalise import N_CHANNELS, RATE_HZ, VELOCITY
+from kernels.skeleton.canonical import JOINTS
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 90, 300])
@@ -67,3 +68,12 @@ def test_a_motion_of_one_frame_has_it_in_every_third(rng):
     value = rng.normal(size=(1, N_CHANNELS)).astype(np.float32)
     parts = describe(value)[4 * (N_CHANNELS + 28) :][: 3 * N_CHANNELS].reshape(3, N_CHANNELS)
     np.testing.assert_allclose(parts, np.repeat(value, 3, axis=0))
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_either_hand_is_seen_from_its_shoulder_head_hips_and_the_other_hand(side):
+    value = np.zeros((5, N_CHANNELS), np.float32)
+    value[:, 3 * JOINTS.index(f"{side}Hand")] = 2.0
+    way, far = np.split(describe(value)[N_CHANNELS : N_CHANNELS + 28], [21])
+    assert (way.reshape(7, 3)[:, 0] != 0).sum() == 4
+    np.testing.assert_array_equal(np.sort(far), [0, 0, 0, 2, 2, 2, 2])

@@ -1,5 +1,7 @@
 """The encoder of [Ganbat2020]."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -31,3 +33,14 @@ def test_it_learns_and_repeats(dances, is_masked):
     assert a.shape == (16, N_FEATURE)
     apart = np.linalg.norm(a[:, None] - a[None], axis=-1) + np.diag(np.full(16, np.inf))
     assert np.mean(number[apart.argmin(axis=1)] == number) >= 0.75
+
+
+def test_what_stands_behind_a_masked_motion_changes_nothing(dances):
+    motions, labels = dances
+    number = np.unique(labels, return_inverse=True)[1]
+    short, long = (
+        replace(train_document(motions, number, n_frames=64, is_masked=True, steps=3, rows=8), n_frames=n)
+        for n in (64, 96)
+    )
+    few = [motion[:40] for motion in motions[:3]]
+    np.testing.assert_allclose(short.embed(few), long.embed(few), atol=1e-5)

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from kernels.search import network
+from kernels.search.augment import Augmentation
 from kernels.search.measure import leave_one_out
 from kernels.search.normalise import channels
-from kernels.search.train import Training, contrast, train
+from kernels.search.train import Training, _Draw, contrast, train
+from kernels.skeleton import kinematics
+from kernels.skeleton.canonical import CANONICAL, JOINTS
 
 SHORT = Training(steps=12, rows=16)
 
@@ -56,3 +59,16 @@ def test_it_ends_when_told(dances):
 def test_one_motion_is_refused(dance):
     with pytest.raises(ValueError, match="want two motions or more, got 1"):
         train([dance], np.zeros(1, int), how=SHORT)
+
+
+def test_the_other_side_of_a_label_is_drawn_mirrored():
+    """Two motions that raise a hand, one the left and one the right: a label holds one side, drawn from both."""
+    rest = np.tile(kinematics.rest_position(CANONICAL), (30, 1, 1))
+    left, right = rest.copy(), rest.copy()
+    left[:, JOINTS.index("leftHand"), 1] += 0.5
+    right[:, JOINTS.index("rightHand"), 1] += 0.5
+    how = Training(rows=32, rows_a_label=16, augmentation=Augmentation(1.0, 1.0, 0.0))
+    draw = _Draw([left, right], np.array([0, 1]), np.array([1, 0]), how, np.random.default_rng(0))
+    channel, _, label = draw()
+    height = channel[:, 0, [3 * JOINTS.index(f"{side}Hand") + 1 for side in ("left", "right")]]
+    np.testing.assert_array_equal(height[:, 0] > height[:, 1], label == 0)
