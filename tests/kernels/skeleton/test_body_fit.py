@@ -1,5 +1,7 @@
 """A dance on other bodies: the same dance, its feet where they stood."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -113,3 +115,18 @@ def test_what_is_not_canonical_is_refused(dance):
     rig = author(dance, RigPlan(has_root=True))
     with pytest.raises(ValueError, match="want the 22 canonical joints"):
         fit(rig, CANONICAL)
+
+
+def test_what_hangs_from_the_hips_without_a_name_turns_with_them(dance):
+    rig = author(dance, RigPlan())
+    joints = (*rig.skeleton.joints, "tail")
+    offset = np.concatenate([rig.skeleton.offset_xyz_m, [[0.0, 0.0, -0.2]]])
+    turned = np.concatenate([rig.rotation_wxyz, np.tile(rotation.IDENTITY, (rig.n_frames, 1, 1))], axis=1)
+    tailed = Clip(Skeleton(joints, np.append(rig.skeleton.parent, 0), offset), 30.0, rig.root_xyz_m, turned)
+    character = measure(tailed, map_joints(tailed.skeleton))
+    around = dance.rotation_wxyz.copy()
+    around[:, 0] = rotation.mul(rotation.from_heading(1.0), around[:, 0])
+    worn = put_on(fit(replace(dance, rotation_wxyz=around), character.figure), character)
+    _, orientation = kinematics.place(worn)
+    assert rotation.angle_between(orientation[:, 0], rotation.IDENTITY).min() > 0.5
+    np.testing.assert_allclose(rotation.angle_between(orientation[:, -1], orientation[:, 0]), 0.0, atol=1e-6)

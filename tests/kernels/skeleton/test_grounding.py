@@ -171,3 +171,27 @@ def test_a_leg_comes_back_to_its_source_within_the_time_to_fade():
     assert faded[10] == 1
     assert (np.diff(faded[5:11]) > 0).all()
     assert not grounding._fade(np.zeros((4, 3)), np.zeros(4, bool), 5).any()
+
+
+def test_where_nothing_is_planted_the_lower_foot_is_taken_to_the_floor(step):
+    _, position, _, contacts = step
+    high = position[:1].repeat(40, axis=0) + np.array([0.0, 0.3, 0.0])
+    high[:, TOES[1], 1] += 0.1
+    never = np.zeros((40, 2), bool)
+    none = FootContacts(never, never, 0.0, contacts.ankle_height_m, contacts.toes_height_m)
+    source = {"source_ankle_xyz_m": high[:, ANKLES], "source_toes_xyz_m": high[:, TOES]}
+    sunk = high - np.array([0.0, 0.05, 0.0])  # the canonical body stands 5 cm lower than the source
+    shift = grounding.plant_root(sunk, contacts=none, frame_rate_hz=RATE, **source)
+    wanted = grounding.TOES_HEIGHT_M - contacts.toes_height_m + 0.05
+    np.testing.assert_allclose(shift[:, 1], wanted, atol=1e-3)
+
+
+def test_an_ankle_that_may_not_come_all_the_way_goes_the_way_it_should(step):
+    """Far to the side: within the limit it goes there, and neither up nor down."""
+    _, position, orientation, _ = step
+    bent = position[5:6].copy()
+    sideways = np.tile([0.3, 0.0, 0.0], (1, 2, 1))
+    turned = grounding.bend_legs(bent, orientation[5:6], sideways, limit_rad=np.radians(4.0))
+    moved = kinematics.hang(CANONICAL, bent[:, 0], turned)[0, ANKLES] - bent[0, ANKLES]
+    assert (moved[:, 0] > 0.02).all()
+    assert (np.abs(moved[:, 1:]) < 0.05 * moved[:, :1]).all()

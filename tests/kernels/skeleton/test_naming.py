@@ -255,3 +255,8 @@ def test_a_rig_at_the_worlds_origin_is_no_hindrance():
     skeleton = rig(STUDIOS["bandai"], has_root=True)
     assert skeleton.joints[0] == "Root"
     assert naming.map_joints(skeleton).joint["hips"] == "Hips"
+
+
+@pytest.mark.parametrize(("name", "told"), [("Mid", ("", "mid")), ("C", ("", "c")), ("J_Bip_C_Head", ("", "head"))])
+def test_a_word_for_the_middle_is_left_out_unless_it_is_the_whole_name(name, told):
+    assert naming.side_and_part(name) == told

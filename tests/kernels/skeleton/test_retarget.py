@@ -4,9 +4,9 @@ import pytest
 from kernels import rotation
 from kernels.skeleton import canonical, kinematics, naming
 from kernels.skeleton.canonical import CANONICAL, JOINTS
-from kernels.skeleton.contacts import find_contacts, foot_slide
+from kernels.skeleton.contacts import FootContacts, find_contacts, foot_slide
 from kernels.skeleton.grounding import ANKLES, TOES
-from kernels.skeleton.retarget import retarget
+from kernels.skeleton.retarget import _planted_pitch_rad, retarget
 from kernels.synthetic import dancer, rigs
 from kernels.types import Clip, Skeleton
 
@@ -245,3 +245,15 @@ def test_bodies_without_sides_or_up(step):
     flat = rigs.RigPlan(stretch=dict.fromkeys(("spine", "chest", "upperChest", "neck"), 0.0))
     with pytest.raises(ValueError, match="want hips and neck apart"):
         bring_back(rigs.author(step, flat))
+
+
+def test_the_slope_of_feet_is_the_usual_one_while_ankle_and_toes_are_planted():
+    ankle = np.tile([[0.1, 0.05, 0.0], [-0.1, 0.05, 0.0]], (3, 1, 1))
+    toes = np.tile([[0.1, 0.0, 0.12], [-0.1, 0.0, 0.12]], (3, 1, 1))
+    toes[2, :, 1] = 0.2  # tapping
+    planted = np.array([[True, True], [True, True], [False, False]])
+    contacts = FootContacts(planted, planted, 0.0, 0.05, 0.0)
+    assert _planted_pitch_rad(ankle, toes, contacts) == pytest.approx(-np.arctan2(0.05, 0.12))
+    assert _planted_pitch_rad(ankle, ankle, contacts) is None  # toes in the ankle's place
+    never = FootContacts(~planted & False, planted, 0.0, 0.05, 0.0)
+    assert _planted_pitch_rad(ankle, toes, never) is None

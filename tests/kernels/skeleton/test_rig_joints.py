@@ -163,3 +163,9 @@ def test_a_box_turned_is_held_by_a_wider_one():
     found = box_around(low, high, matrix_of(eighth, 2.0, (0.0, 0.0, 1.0)))
     half = np.sqrt(2) / 2
     np.testing.assert_allclose(found, [[-half, -half, -0.5], [half, half, 0.5]], atol=1e-12)
+
+
+def test_a_root_stands_as_it_is_turned_whatever_the_last_joint_does():
+    half = rotation.from_axis_angle(np.array([1.0, 0.0, 0.0]), 1.0)
+    pose = RestPose(np.array([-1, 0]), np.zeros((2, 3)), np.array([QUARTER, half]), np.ones(2))
+    np.testing.assert_allclose(pose.turned_wxyz, [QUARTER, rotation.mul(QUARTER, half)], atol=1e-12)
