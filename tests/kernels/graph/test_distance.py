@@ -132,3 +132,16 @@ def test_poses_made_differently_are_refused(make_poses):
         check_metric("angle")
     with pytest.raises(ValueError, match="float32 or float64"):
         error_bound(make_poses(1), np.dtype(np.float16))
+
+
+def test_error_bound_is_that_of_the_longest_pose_and_all_terms():
+    unit = 2.0**-24
+    turned = np.tile([1.0, 0.0, 0.0, 0.0], (3, 2, 1))
+    poses = PoseFeatures(
+        "rotation", np.array([[3.0, 4.0, 0.0], [0.0] * 3, [1.0, 0.0, 0.0]]), turned, np.array([0.5, 3.5])
+    )
+    relative, absolute = error_bound(poses, np.dtype(np.float32))
+    assert relative == pytest.approx(unit * (3 + 2 + 16))
+    assert absolute == pytest.approx(2 * (2 * unit * 5.0 + 6 * unit * 2.0))
+    none = PoseFeatures("rotation", np.zeros((0, 3)), np.zeros((0, 2, 4)), np.array([0.5, 3.5]))
+    assert error_bound(none, np.dtype(np.float32))[1] == pytest.approx(2 * 6 * unit * 2.0)

@@ -100,3 +100,16 @@ def test_motions_are_predicted_from_the_one_before_with_their_music():
     assert predicted(model, state, at, loud) == pytest.approx(np.log(wanted).sum())
     far = predicted(model, state, at, loud - 1e4)  # however small the likelihoods are
     assert far == pytest.approx(np.log(wanted).sum())
+
+
+def test_likelihoods_far_apart_leave_the_motion_that_the_music_calls():
+    model = SimpleNamespace(log_transition=np.log(np.full((2, 2), 0.5)))
+    told = predicted(model, np.array([0, 1]), np.array([1]), np.array([[-5000.0, -100.0]]))
+    assert told == pytest.approx(0.0)
+
+
+def test_one_motion_cannot_be_held_out():
+    few = [Performed(np.array([0]), (np.ones((1, 3)),))]
+    one = measure(few, 2, [3], smoothing=Smoothing(1.0, (1.0,)))
+    assert (one.n_motions.tolist(), one.p) == ([0], 1.0)
+    assert np.isnan([one.with_music, one.bigram, one.shuffled]).all()

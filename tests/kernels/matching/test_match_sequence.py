@@ -281,3 +281,12 @@ def test_errors():
 def test_the_first_step_of_a_span_pays_for_it():
     np.testing.assert_array_equal(at_first_steps(np.array([1.0, 2.0, 3.0]), np.array([0, 0, 2, 2, 2])), [1, 0, 3, 0, 0])
     np.testing.assert_array_equal(at_first_steps(np.array([1.0, 2.0]), np.array([1])), [2])
+
+
+def test_a_choice_that_shows_less_of_the_one_before_is_taken_only_where_the_whole_is_cheaper():
+    """Of a long piece half was shown before, of a short one all of it, though it shows less of what was before."""
+    before = candidates([0.0], clip=[0], length=4.0)
+    after = Candidates(np.zeros(2, np.int64), np.zeros(2), np.array([8.0, 2.0]), np.array([0.0, 0.1]))
+    found = choose([before, after], [joint(np.zeros((1, 2)))], unconnected_cost=0.0)
+    assert found.choice.tolist() == [0, 0]
+    assert found.total_cost == pytest.approx(0.5)

@@ -10,6 +10,7 @@ from kernels.matching.score import (
     similarity,
     start_count,
     sums,
+    sums_of_candidates,
 )
 
 
@@ -124,3 +125,20 @@ def test_parts_of_a_catalogue_merge_to_the_whole():
         merge_matches([whole, whole[:1]], k=1)
     with pytest.raises(ValueError, match="k: want"):
         merge_matches(parts, k=0)
+
+
+def test_candidates_of_many_segments_score_as_each_alone_to_the_bit():
+    rng = np.random.default_rng(5)
+    clip, lengths = rng.random(40), np.array([9, 6])
+    segments = np.zeros((2, 9))
+    for row, n in enumerate(lengths):
+        segments[row, :n] = rng.random(n)
+    segment, numerator, first = np.array([0, 1, 1, 0]), np.array([45, 50, 55, 55]), np.array([0, 34, 3, 30])
+    score, motion_sum = sums_of_candidates(
+        segments, clip, n_frames=lengths, segment=segment, first=first, numerator=numerator
+    )
+    for k in range(4):
+        alone = sums(
+            segments[segment[k], : lengths[segment[k]]], clip, numerator=int(numerator[k]), starts=first[k : k + 1]
+        )
+        assert (score[k], motion_sum[k]) == (alone[0][0], alone[1][0])

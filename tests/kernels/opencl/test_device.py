@@ -45,3 +45,9 @@ def test_double_precision_is_refused_where_there_is_none():
     assert real_type(Plain(), "single") == "float32"
     with pytest.raises(ValueError, match="want single on Plain GPU, got double"):
         real_type(Plain(), "double")
+
+
+def test_all_devices_of_all_platforms_are_listed():
+    if not (platforms := device.cl.get_platforms()):
+        pytest.skip("no OpenCL driver here")
+    assert list_devices() == [one for platform in platforms for one in platform.get_devices()]
