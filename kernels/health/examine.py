@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
+from kernels.health import glitches, one_body, righting
+from kernels.health.body_in_motion import BodyInMotion
+from kernels.health.speed_limit import LIMIT_DEG_PER_S, FastTurn, fast_turns
 from kernels.health.verdicts import ClipFault, ExaminedClip, fence_of
 from kernels.skeleton.naming import JointMapping
 from kernels.types import Clip
+
+_LEAST_SHARE = 0.2
+"""Of a clip's frames that are left to show, below which it is refused. Chosen by hand."""
+
+_LEAST_S = 1.0
+"""Left to show of a clip of which half or more is fenced, below which it is refused: two beats at 120 a minute. Chosen
+by hand."""
 
 
 def examine(clip: Clip, mapping: JointMapping) -> ExaminedClip:
@@ -20,7 +30,59 @@ def examine(clip: Clip, mapping: JointMapping) -> ExaminedClip:
     Returns
     -------
     ExaminedClip
+        As it came for F = 0. A clip of which nothing can be danced is given back as it came, with the faults that
+        were found first.
+
+    Notes
+    -----
+    First what was done to the whole: a second body, the path's unit, the up sign, the handedness. Each is put right
+    before the next is looked at, since that builds on it. Then single frames: jumps are mended or fenced, and last, in
+    what is left, no joint may turn faster than a dance may (:mod:`kernels.health.speed_limit`).
     """
+    if clip.n_frames == 0:
+        return ExaminedClip(clip)
+    body = BodyInMotion(clip, mapping)
     faults: list[ClipFault] = []
-    is_fenced = fence_of(faults, clip.n_frames) if faults else np.zeros(clip.n_frames, bool)
-    return ExaminedClip(clip, tuple(faults), is_fenced)
+    for look in (one_body.more_bodies, righting.in_one_unit, righting.turned_upright, righting.unmirrored):
+        righted, found = look(body)
+        faults += found
+        if any(fault.verdict == "refused" for fault in found):
+            return ExaminedClip(clip, tuple(faults))
+        if righted is not None:
+            body = BodyInMotion(righted, mapping)
+    mended, found = glitches.mend(body)
+    faults += found
+    if mended is not body.clip:
+        body = BodyInMotion(mended, mapping)
+    is_fenced = fence_of(faults, clip.n_frames)
+    faults += glitches.told_once([_fenced(body, turn) for turn in fast_turns(body, is_fenced)])
+    faults.sort(key=lambda fault: (fault.first, fault.last, fault.kind, fault.joint))
+    faults += _little_left(body, faults)
+    return ExaminedClip(body.clip, tuple(faults))
+
+
+def _fenced(body: BodyInMotion, turn: FastTurn) -> ClipFault:
+    joint = body.mapping.joint[turn.joint]
+    against = "in the world" if turn.is_in_world else "against its parent"
+    said = (
+        f"{joint} turns {turn.speed_deg_per_s:.0f}°/s {against} at {body.at_s(turn.first)}, want at most "
+        f"{LIMIT_DEG_PER_S:.0f}"
+    )
+    if turn.is_sudden:
+        return ClipFault(
+            "flip", joint, turn.first, turn.last, "fenced", f"{said}; not shown; clean it where it was recorded"
+        )
+    return ClipFault("fast", joint, turn.first, turn.last, "fenced", f"{said}: real, and too fast to be shown")
+
+
+def _little_left(body: BodyInMotion, faults: list[ClipFault]) -> list[ClipFault]:
+    """Refuse a clip of which little is left."""
+    is_fenced = fence_of(faults, body.clip.n_frames)
+    left = float(1 - is_fenced.mean())
+    left_s = left * body.clip.n_frames / body.clip.frame_rate_hz
+    if left >= 0.5 or (left >= _LEAST_SHARE and left_s >= _LEAST_S):
+        return []
+    worst = max((f for f in faults if f.verdict == "fenced"), key=lambda f: f.last - f.first)
+    whole_s = body.clip.n_frames / body.clip.frame_rate_hz
+    said = f"{left_s:.2f} s of {whole_s:.2f} s are left to show; most is lost to: {worst.reason}"
+    return [replace(worst, first=0, last=body.clip.n_frames - 1, verdict="refused", reason=said)]

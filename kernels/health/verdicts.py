@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -77,12 +77,15 @@ class ExaminedClip:
     ----------
     clip : Clip of F frames, mended where that was plain
     faults : in order of frames, then of joints
-    is_fenced : (F,) bool, frames that are never shown
     """
 
     clip: Clip
     faults: tuple[ClipFault, ...] = ()
-    is_fenced: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+
+    @property
+    def is_fenced(self) -> NDArray[np.bool_]:
+        """Frames that are never shown, (F,) bool."""
+        return fence_of(self.faults, self.clip.n_frames)
 
     @property
     def refusal(self) -> str:
