@@ -76,7 +76,16 @@ class BodyInMotion:
         return self._placed[1]
 
     def place(self, *names: str) -> Float:
-        """Mean place (F, 3) of joints given by their canonical names, metres."""
+        """Find the mean place of joints.
+
+        Parameters
+        ----------
+        names : canonical names that the rig has
+
+        Returns
+        -------
+        (F, 3) float64, metres, world
+        """
         return np.asarray(self.position_xyz_m[:, [self.at[name] for name in names]].mean(axis=1), np.float64)
 
     @cached_property
@@ -129,11 +138,30 @@ class BodyInMotion:
         return turn
 
     def whole(self, kind: str, verdict: str, reason: str, joint: str = "") -> ClipFault:
-        """Make a fault of the whole clip."""
+        """Make a fault of the whole clip.
+
+        Parameters
+        ----------
+        kind, verdict, reason, joint : as :class:`kernels.health.verdicts.ClipFault` has them
+
+        Returns
+        -------
+        ClipFault
+            From the first frame to the last.
+        """
         return ClipFault(kind, joint, 0, self.clip.n_frames - 1, verdict, reason)  # type: ignore[arg-type]
 
     def at_s(self, frame: int) -> str:
-        """Say when a frame is, for sentences."""
+        """Say when a frame is, for sentences.
+
+        Parameters
+        ----------
+        frame : int
+
+        Returns
+        -------
+        str
+        """
         return f"{frame / self.clip.frame_rate_hz:.2f} s"
 
 
