@@ -180,3 +180,13 @@ def test_a_segment_that_is_licensed_to_no_clip_is_danced_by_others(stored_poses)
     danced = by_matching(found, poses, np.arange(0, 4.5, 0.5), Settings())
     assert danced.metadata["spans_without_a_match"] == 1
     assert danced.steps.song_end_s[-1] == 4.0
+
+
+def test_of_pairs_of_pieces_it_is_told_which_share_connects(stored_poses):
+    """One piece before two: the other clip's pose is a radian off, the own clip's goes on."""
+    segments = Segments(*(np.array(v) for v in ([0.0, 2.0], [2.0, 4.0], [0, 240], [240, 240])), np.zeros(2))
+    of_segment = [one_place(("a", 0, 3.0, 0.8)), one_place(("b", 0, 3.0, 0.8), ("a", 240, 2.0, 0.2))]
+    found = LoadedMatches(segments, STEPS, np.ones(600), of_segment, CLIPS)
+    poses = stored_poses(RATE_HZ, a=np.tile(STILL, 2), b=1.0 + np.tile(TURN, 2))
+    settings = Settings(match_path=MatchPathSettings(other_starts=0))
+    assert by_matching(found, poses, np.arange(0, 4.5, 0.5), settings).metadata["share_of_pairs_that_connect"] == 0.5

@@ -6,7 +6,7 @@ import pytest
 
 from assets.dancing import characters
 from assets.dancing.characters import CharacterError
-from assets.sources.sources import Request, Sources
+from assets.sources.sources import Request, Sources, fingerprint
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.naming import map_joints
 from kernels.skeleton.retarget import retarget
@@ -62,3 +62,9 @@ def test_a_dance_is_dressed_and_its_feet_are_measured(studio, write_hero, tmp_pa
     assert abs(facts["added_foot_slide_cm_per_s"]) < 0.1
     assert facts["penetration_cm"] < 0.5
     assert facts["joints"]["hips"] == "hero_hips"
+
+
+def test_a_character_without_a_file_has_the_version_of_its_name(studio):
+    studio.requests = lambda: {"waltz|graph": Request(character="robot"), "waltz|hmm": Request()}
+    assert characters.character_version(studio, "waltz|graph") == fingerprint("robot")
+    assert characters.character_version(studio, "waltz|hmm") == fingerprint("")

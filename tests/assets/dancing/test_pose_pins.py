@@ -198,3 +198,22 @@ def test_told_of_a_finished_dance(graph, poses, clip, at_s, is_kept):
         assert told["distance_m"] == pytest.approx(0.0, abs=1e-6)
     else:
         assert told["distance_m"] > 0.005
+
+
+@pytest.mark.parametrize(("at_s", "is_kept"), [(1.2, True), (0.8, False)])
+def test_of_a_clip_without_beats_what_is_no_further_than_the_twentieth_nearest_beat_is_kept(
+    graph, poses, at_s, is_kept
+):
+    """Clip c stands almost still: the arms of a are further up between its beats than on any of them."""
+    nodes = pl.DataFrame(
+        {
+            "clip_id": [NAMES[c] for c in graph.clip_index],
+            "time_s": graph.time_s,
+            "is_mirrored": [False] * 20,
+            "is_kept": [True] * 20,
+        }
+    )
+    dance = CanonicalClip("dance", RATE_HZ, *swinging(*CLIPS["day-a"]))
+    wish = parse_pin("2=pose:day-c@1.0")
+    told = shown_pose(wish, 2.0, lineage("day-a", at_s), dance, ClipPoses(poses.stored, 1e-9), nodes)
+    assert told["is_kept"] is is_kept

@@ -1,16 +1,18 @@
 """Places of a song, and candidates for them, against the dances they lead to."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from assets.dancing.asked import Direction
 from assets.dancing.by_graph import GraphCatalogue, by_graph
-from assets.dancing.proposals import place_of, propose
+from assets.dancing.proposals import place_of, propose, propose_at
 from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import DirectionError, Nodes
 from assets.reading.songs import PlayedSong
+from assets.tables.music import from_music_beat
 from kernels.graph.nodes import beat_nodes
 from kernels.music.repeats import Repeat
 from kernels.types import BeatGrid, MotionGraph
@@ -115,3 +117,11 @@ def test_parts_that_come_again_are_those_of_the_dance(known, song):
     for place in ("beat:3-5", "beat:9-11"):
         free = propose(known, song, again, Direction(), place_of(place, song))
         assert free["best_cost"] == pytest.approx(plain["best_cost"])
+
+
+@pytest.mark.parametrize("n_beats", [0, 1])
+def test_a_song_of_fewer_than_two_beats_cannot_be_danced(n_beats):
+    number = np.zeros(n_beats, int)
+    rows = from_music_beat("waltz", BeatGrid(np.full(n_beats, 0.5), number, number, np.ones(n_beats)))
+    with pytest.raises(RefusalError, match="waltz: cannot be danced: it has no beats; name a beats file"):
+        propose_at({"music_beat": SimpleNamespace(read=lambda song: rows)}, None, "waltz", "1")
