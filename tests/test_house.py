@@ -90,7 +90,6 @@ TESTED_ELSEWHERE = {
     "assets/declare.py",
     "assets/graph.py",
     "assets/hmm.py",
-    "assets/dancing/recordings.py",
     "assets/motion.py",
     "assets/search.py",
     "assets/partitions.py",
