@@ -1,4 +1,4 @@
-"""From the files under ``clips/`` to clips, skeletons and poses, file by file: parsed, or calibrated from a suit."""
+"""From the files under ``clips/`` to clips, skeletons and poses: parsed or calibrated, and examined."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,19 +16,21 @@ from assets.sources.sources import ClipFile, Studio, session_version
 from assets.stamps import ClipStamp, Earlier, Part, Parts, Progress, content_version, version_of
 from assets.tables import pack
 from assets.tables.calibration import from_calibration
-from assets.tables.motion import from_pose, from_skeleton
-from kernels.skeleton.naming import map_joints
+from assets.tables.motion import from_clip_fault, from_pose, from_skeleton
+from kernels.health.examine import examine
+from kernels.health.verdicts import ExaminedClip, within
+from kernels.skeleton.naming import JointMapping, map_joints
 from kernels.types import Clip
 from schemas.calibration import CALIBRATION
-from schemas.motion import CLIP, POSE, SKELETON
+from schemas.motion import CLIP, CLIP_FAULT, POSE, SKELETON
 
 
 @table_assets(
     "capture",
     # Poses first: they are made one session at a time while they are stored, and leave the small tables behind.
-    (POSE, SKELETON, CALIBRATION, CLIP),
+    (POSE, SKELETON, CALIBRATION, CLIP_FAULT, CLIP),
     group="capture",
-    code_version="4",
+    code_version="5",
     settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,
@@ -45,7 +47,7 @@ def capture(
     keys = [lake_key(key) for key in context.partition_keys]
     progress.begin("reading clips", sum(len(sessions.get(key, ())) for key in keys))
     reader = _Reader(studio, solvers, earlier, progress, code_version(context, CLIP.name))
-    small: dict[str, list[Part]] = {table.name: [] for table in (SKELETON, CALIBRATION, CLIP)}
+    small: dict[str, list[Part]] = {table.name: [] for table in (SKELETON, CALIBRATION, CLIP_FAULT, CLIP)}
 
     def poses() -> Iterator[Part]:
         for key in keys:
@@ -64,12 +66,13 @@ _UNREAD = "cannot be read"
 
 @dataclass(frozen=True, eq=False)
 class _Reading:
-    """What a file came to: its row, and its rows in the tables of skeletons, poses and calibrations."""
+    """What a file came to: its row, and its rows in the tables of skeletons, poses, calibrations and faults."""
 
     row: dict[str, object]
     skeleton: pa.Table
     pose: pa.Table
     calibration: pa.Table
+    fault: pa.Table
 
 
 class _Reader:
@@ -93,7 +96,7 @@ class _Reader:
         is_unread = False
         found: dict[str, _Reading] = {}
         for clip in clips:
-            made_from = version_of(self._made_by[clip.kind], clip.sha256)
+            made_from = version_of(self._made_by[clip.kind], clip.sha256, _answered_for(clip))
             if clip.problem:
                 row = _refused(clip.problem)
             elif clip.key in known and known[clip.key][0] == made_from:
@@ -118,6 +121,7 @@ class _Reader:
             POSE.name: {key: reading.pose for key, reading in found.items()},
             SKELETON.name: {key: reading.skeleton for key, reading in found.items()},
             CALIBRATION.name: {key: reading.calibration for key, reading in found.items()},
+            CLIP_FAULT.name: {key: reading.fault for key, reading in found.items()},
         }
         parts = {
             table.name: Part(
@@ -127,7 +131,7 @@ class _Reader:
                 _stamps(stamps, made[table.name]),
                 counts if table is POSE else {},
             )
-            for table in (POSE, SKELETON)
+            for table in (POSE, SKELETON, CLIP_FAULT)
         }
         calibration = pack.concat(CALIBRATION, _filled(made[CALIBRATION.name]))
         solver = self._solvers(self._studio.settings().calibration.method) if calibration.num_rows else None
@@ -155,7 +159,7 @@ class _Reader:
 
     def _carried(self, session: str) -> dict[str, tuple[str, _Reading]]:
         """Look up the record of each clip: what it was read from, and its rows."""
-        order = (CLIP, SKELETON, POSE, CALIBRATION)
+        order = (CLIP, SKELETON, POSE, CALIBRATION, CLIP_FAULT)
         stamps = [self._earlier.stamp(table.name, session) for table in order]
         stored = [self._earlier.table(table.name, session) for table in order]
         if any(stamp is None for stamp in stamps) or any(table is None for table in stored):
@@ -182,8 +186,11 @@ class _Reader:
             mapping = take.mapping or map_joints(take.clip.skeleton, self._settings.joints)
         except (FormatError, ValueError, OSError) as error:
             return _nothing(_sentence(error))
+        examined = _examined(take.clip, mapping, source)
+        if examined.refusal:
+            return _nothing(examined.refusal, from_clip_fault(source.key, examined.faults, take.clip.frame_rate_hz))
         row = _read(
-            take.clip,
+            examined,
             metres_per_unit=take.world.metres_per_unit,
             up_axis=take.world.up_axis,
             root_offset_rule=take.world.root_offset_rule,
@@ -191,9 +198,10 @@ class _Reader:
         )
         return _Reading(
             row,
-            from_skeleton(source.key, take.clip.skeleton, mapping),
-            from_pose(source.key, take.clip),
+            from_skeleton(source.key, examined.clip.skeleton, mapping),
+            from_pose(source.key, examined.clip, examined.is_fenced),
             CALIBRATION.empty(),
+            from_clip_fault(source.key, examined.faults, examined.clip.frame_rate_hz),
         )
 
     def _calibrate(self, source: ClipFile) -> _Reading:
@@ -208,8 +216,11 @@ class _Reader:
             mapping = map_joints(found.clip.skeleton, self._settings.joints)
         except (FormatError, CalibrationError, ValueError, OSError) as error:
             return _nothing(_sentence(error))
+        examined = _examined(found.clip, mapping, source)
+        if examined.refusal:
+            return _nothing(examined.refusal, from_clip_fault(source.key, examined.faults, found.clip.frame_rate_hz))
         row = _read(
-            found.clip,
+            examined,
             metres_per_unit=found.suit.metres_per_unit,
             up_axis=up_axis(found.gauge),
             root_offset_rule="",
@@ -218,32 +229,49 @@ class _Reader:
         )
         return _Reading(
             row,
-            from_skeleton(source.key, found.clip.skeleton, mapping),
-            from_pose(source.key, found.clip),
+            from_skeleton(source.key, examined.clip.skeleton, mapping),
+            from_pose(source.key, examined.clip, examined.is_fenced),
             from_calibration(source.key, found),
+            from_clip_fault(source.key, examined.faults, examined.clip.frame_rate_hz),
         )
 
 
-def _read(clip: Clip, **said: object) -> dict[str, object]:
+def _examined(clip: Clip, mapping: JointMapping, source: ClipFile) -> ExaminedClip:
+    """Examine a clip, unless the studio answers for it itself; what it cut off is not danced."""
+    said = source.facts
+    found = ExaminedClip(clip) if said.health == "ok" else examine(clip, mapping)
+    return within(found, said.start_s, said.end_s)
+
+
+def _answered_for(clip: ClipFile) -> str:
+    """Say what of a clip's reading its facts decide."""
+    said = clip.facts
+    return "" if not said.health and said.start_s is said.end_s else repr((said.health, said.start_s, said.end_s))
+
+
+def _read(examined: ExaminedClip, **said: object) -> dict[str, object]:
+    clip = examined.clip
     return {
         "frame_rate_hz": clip.frame_rate_hz,
         "frame_count": clip.n_frames,
         "duration_s": clip.duration_s,
         "state": "read",
         "reason": None,
+        "danceability_ratio": float(1.0 - examined.is_fenced.mean()) if clip.n_frames else 0.0,
         "joint_count": len(clip.skeleton.joints),
         "warnings": [],
         **said,
     }
 
 
-def _nothing(reason: str) -> _Reading:
-    return _Reading(_refused(reason), SKELETON.empty(), POSE.empty(), CALIBRATION.empty())
+def _nothing(reason: str, fault: pa.Table | None = None) -> _Reading:
+    faults = CLIP_FAULT.empty() if fault is None else fault
+    return _Reading(_refused(reason), SKELETON.empty(), POSE.empty(), CALIBRATION.empty(), faults)
 
 
 def _refused(reason: str) -> dict[str, object]:
     nothing = dict.fromkeys(("frame_count", "joint_count"), 0) | dict.fromkeys(
-        ("frame_rate_hz", "duration_s", "metres_per_unit"), 0.0
+        ("frame_rate_hz", "duration_s", "metres_per_unit", "danceability_ratio"), 0.0
     )
     texts = dict.fromkeys(("up_axis", "root_offset_rule", "naming_family"), "")
     return {**nothing, **texts, "state": "refused", "reason": reason, "warnings": []}
@@ -265,6 +293,7 @@ def _row(clip: ClipFile, reading: dict[str, object]) -> dict[str, object]:
         "licence": facts.licence,
         "performed_to": facts.performed_to,
         "performed_offset_s": facts.performed_offset_s,
+        "health": facts.health,
     }
 
 

@@ -9,7 +9,7 @@ import polars as pl
 import pyarrow as pa
 
 from assets.declare import table_assets
-from assets.graph_memory import Beats, KeptArrays, keep, near_pairs, recall
+from assets.graph_memory import Beats, KeptArrays, keep, near_pairs, nodes_of, recall
 from assets.partitions import EVERY
 from assets.plots.draw import markdown
 from assets.plots.graph import motion_graph_picture
@@ -22,7 +22,7 @@ from assets.tables.motion import CanonicalClip, to_canonical_pose
 from kernels import rotation
 from kernels.graph.beat_features import BeatFeatures, beat_features
 from kernels.graph.distance import PairDistance
-from kernels.graph.nodes import beat_nodes
+from kernels.graph.nodes import stretch_around
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
 from kernels.graph.shortlist import Work, nearest_of
 from kernels.graph.transitions import Transitions, blend_margin_s, connect
@@ -33,7 +33,7 @@ from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
 from schemas.keys import mirrored, source_clip
 from schemas.settings import MotionGraphSettings
 
-MEMORY_VERSION = "2"
+MEMORY_VERSION = "3"
 """Raised by hand when features, rules or the shortlist change meaning."""
 
 PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
@@ -48,7 +48,7 @@ PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
     "motion_graph",
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
-    code_version="4",
+    code_version="5",
     settings="motion_graph dance.blend_s",
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
     checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
@@ -75,7 +75,7 @@ def motion_graph(
         labels |= {row["clip_id"]: row["label"] for row in pack.read_rows(clip.read(key)).to_pylist()}
         beats += _session(key, labels, canonical_pose, motion_beat, settings, known)
         progress.step()
-    nodes = beat_nodes([b.time_s for b in beats], [b.duration_s for b in beats])
+    nodes = nodes_of(beats)
     features, listed, work = near_pairs(
         earlier,
         beats,
@@ -180,7 +180,8 @@ def _beats(moved: CanonicalClip, beat_s: Float, version: str, settings: MotionGr
     accent = accents(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
     speed = speed_between(moved.position_xyz_m, moved.frame_rate_hz, time_s=time_s)
     usual_at = np.full(len(time_s), usual)
-    return Beats(moved.clip_id, version, moved.duration_s, time_s, features, accent, peak, usual_at, speed)
+    start_s, end_s = stretch_around(time_s, moved.is_fenced, moved.frame_rate_hz)
+    return Beats(moved.clip_id, version, time_s, start_s, end_s, features, accent, peak, usual_at, speed)
 
 
 def _of_no_beat(settings: MotionGraphSettings) -> BeatFeatures:

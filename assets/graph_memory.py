@@ -14,18 +14,22 @@ from kernels.graph.shortlist import Shortlist, Work, make_shortlist, update_shor
 from kernels.graph.transitions import Nearest
 from kernels.types import Float, Int
 
-_CLIP_ARRAYS = ("time_s", "accent", "peak_jerk", "usual_jerk", "speed")
+_CLIP_ARRAYS = ("time_s", "start_s", "end_s", "accent", "peak_jerk", "usual_jerk", "speed")
 _PAIR_ARRAYS = ("row", "other", "distance", "weight")
 
 
 @dataclass(frozen=True, eq=False)
 class Beats:
-    """The beats of one clip as the graph takes them; ``version`` is that of what they were made from."""
+    """The beats of one clip as the graph takes them.
+
+    ``version`` is that of what they were made from; ``start_s`` and ``end_s`` bound what may be shown around each.
+    """
 
     clip_id: str
     version: str
-    duration_s: float
     time_s: Float
+    start_s: Float
+    end_s: Float
     features: BeatFeatures
     accent: Float
     peak_jerk: Float
@@ -76,15 +80,11 @@ def recall(memory: KeptArrays, rules: str) -> Remembered | None:
     end = np.cumsum(kept["beat_count"])
     metric: Any = str(kept["metric"])
     clips = {}
-    for i, (clip, version, duration_s) in enumerate(
-        zip(kept["clip_id"].tolist(), kept["version"].tolist(), kept["duration_s"].tolist(), strict=True)
-    ):
+    for i, (clip, version) in enumerate(zip(kept["clip_id"].tolist(), kept["version"].tolist(), strict=True)):
         here = slice(int(end[i] - kept["beat_count"][i]), int(end[i]))
         pose = PoseFeatures(metric, kept["linear"][here], kept["quaternion_wxyz"][here], kept["quaternion_weight"])
         features = BeatFeatures(pose, kept["local_distance"][here], kept["jerk_ratio"][here])
-        clips[clip] = Beats(
-            clip, version, duration_s, features=features, **{name: kept[name][here] for name in _CLIP_ARRAYS}
-        )
+        clips[clip] = Beats(clip, version, features=features, **{name: kept[name][here] for name in _CLIP_ARRAYS})
     row, other, apart, weight = (kept[name] for name in _PAIR_ARRAYS)
     pairs = Nearest(row, other, apart, weight, metric, float(kept["min_margin_s"]), kept["is_smooth"])
     return Remembered(clips, Shortlist(pairs, kept["radius"], kept["allowed_radius"]))
@@ -99,7 +99,6 @@ def keep(memory: KeptArrays, rules: str, beats: Sequence[Beats], features: BeatF
             "metric": np.array(pose.metric),
             "clip_id": np.array([b.clip_id for b in beats], np.str_),
             "version": np.array([b.version for b in beats], np.str_),
-            "duration_s": np.array([b.duration_s for b in beats], np.float64),
             "beat_count": np.array([len(b.time_s) for b in beats], np.int64),
             "linear": pose.linear,
             "quaternion_wxyz": pose.quaternion_wxyz,
@@ -114,6 +113,21 @@ def keep(memory: KeptArrays, rules: str, beats: Sequence[Beats], features: BeatF
             **{name: getattr(pairs, name) for name in _PAIR_ARRAYS},
         }
     )
+
+
+def nodes_of(beats: Sequence[Beats]) -> BeatNodes:
+    """Line up the beats of all clips as nodes.
+
+    Parameters
+    ----------
+    beats : of all clips, in order
+
+    Returns
+    -------
+    BeatNodes, clips numbered in that order
+    """
+    joined = (np.concatenate([*(getattr(b, n) for b in beats), np.zeros(0)]) for n in ("time_s", "start_s", "end_s"))
+    return BeatNodes(np.repeat(np.arange(len(beats)), [len(b.time_s) for b in beats]), *joined)
 
 
 def near_pairs(

@@ -16,11 +16,19 @@ from assets.stamps import Earlier, Part, Parts, Progress, Stored, clip_versions,
 from assets.tables import hmm as hmm_tables
 from assets.tables import matching as matching_tables
 from assets.tables import pack
-from assets.tables.motion import from_canonical_pose, from_motion_beat, to_canonical_pose, to_pose, to_skeleton
+from assets.tables.motion import (
+    from_canonical_pose,
+    from_motion_beat,
+    to_canonical_pose,
+    to_fence,
+    to_pose,
+    to_skeleton,
+)
 from kernels import rotation
+from kernels.health.bridging import bridge
 from kernels.hmm.states import assign
 from kernels.motion.motion_beats import BeatSettings, motion_beats
-from kernels.motion.motion_features import contacts_at_feature_rate, motion_features
+from kernels.motion.motion_features import contacts_at_feature_rate, fence_at_feature_rate, motion_features
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.contacts import foot_contacts
@@ -30,7 +38,7 @@ from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE
 from schemas.settings import FeatureSettings, MotionBeatSettings
 
 
-@table_asset(CANONICAL_POSE, group="motion", code_version="1", partitions=SESSION)
+@table_asset(CANONICAL_POSE, group="motion", code_version="2", partitions=SESSION)
 def canonical_pose(
     context: dg.AssetExecutionContext,
     pose: Stored,
@@ -38,7 +46,7 @@ def canonical_pose(
     earlier: dg.ResourceParam[Earlier],
     progress: dg.ResourceParam[Progress],
 ) -> Parts:
-    """Bring every clip to the canonical skeleton."""
+    """Bring every clip to the canonical skeleton; what is never shown of it is bridged."""
     code = code_version(context, CANONICAL_POSE.name)
 
     def session(key: str) -> Part:
@@ -52,20 +60,20 @@ def canonical_pose(
             if clip not in poses:
                 return CANONICAL_POSE.empty()
             rig, mapping = to_skeleton(skeletons[clip])
-            moved = to_pose(poses[clip], rig)
+            moved, is_fenced = to_pose(poses[clip], rig), to_fence(poses[clip])
             try:
-                motion = retarget(moved, mapping)
+                motion = retarget(bridge(moved, is_fenced), mapping)
             except ValueError as error:  # a body that only now turns out to be none must not stop its session
                 context.log.warning(f"{clip}: left out of the canonical poses: {error}")
                 return CANONICAL_POSE.empty()
-            return from_canonical_pose(clip, moved.frame_rate_hz, motion)
+            return from_canonical_pose(clip, moved.frame_rate_hz, motion, is_fenced)
 
         return per_clip(CANONICAL_POSE, key, made_from, one, earlier=earlier, progress=progress)
 
     return Parts(session(key) for key in _begun(progress, "canonical poses", pose))
 
 
-@table_asset(MOTION_BEAT, group="motion", code_version="1", settings="motion_beat", partitions=SESSION)
+@table_asset(MOTION_BEAT, group="motion", code_version="2", settings="motion_beat", partitions=SESSION)
 def motion_beat(
     context: dg.AssetExecutionContext,
     canonical_pose: Stored,
@@ -92,7 +100,7 @@ def motion_beat(
     return Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose))
 
 
-@table_asset(MOTION_FEATURE, group="motion", code_version="2", settings="feature", partitions=SESSION)
+@table_asset(MOTION_FEATURE, group="motion", code_version="3", settings="feature", partitions=SESSION)
 def motion_feature(
     context: dg.AssetExecutionContext,
     canonical_pose: Stored,
@@ -118,7 +126,7 @@ def motion_feature(
     return Parts(session(key) for key in _begun(progress, "motion features", canonical_pose))
 
 
-@table_asset(KEY_POSE, group="motion", code_version="1", settings="basic_motion", partitions=SESSION, only_for="hmm")
+@table_asset(KEY_POSE, group="motion", code_version="2", settings="basic_motion", partitions=SESSION, only_for="hmm")
 def key_pose(
     context: dg.AssetExecutionContext,
     canonical_pose: Stored,
@@ -175,7 +183,7 @@ def beats_of(rows: pa.Table, settings: MotionBeatSettings) -> pa.Table:
     heading = rotation.heading_rad(moved.rotation_wxyz[:, 0])[kept] if settings.frame == "body" else None
     position, how = moved.position_xyz_m[kept], beat_settings(settings)
     beats = motion_beats(position, moved.frame_rate_hz, heading_rad=heading, settings=how)
-    return from_motion_beat(moved.clip_id, beats, moved.frame_rate_hz, first_frame=first)
+    return from_motion_beat(moved.clip_id, beats, moved.frame_rate_hz, first_frame=first, is_fenced=moved.is_fenced)
 
 
 def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
@@ -202,7 +210,8 @@ def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
     feet = [CANONICAL.index(name) for name in ("leftFoot", "leftToes", "rightFoot", "rightToes")]
     stands = foot_contacts(moved.position_xyz_m[:, feet], moved.frame_rate_hz)
     contact = contacts_at_feature_rate(stands, moved.frame_rate_hz, len(found.rhythm))
-    return matching_tables.from_motion_feature(moved.clip_id, found, contact)
+    is_fenced = fence_at_feature_rate(moved.is_fenced, moved.frame_rate_hz, len(found.rhythm))
+    return matching_tables.from_motion_feature(moved.clip_id, found.without(is_fenced), contact, is_fenced)
 
 
 def beat_settings(settings: MotionBeatSettings) -> BeatSettings:

@@ -11,6 +11,7 @@ DANCE = dg.MultiPartitionsDefinition({"song": SONG, "method": METHOD})
 EVERY = dg.AllPartitionMapping()
 SESSION_TABLES = (
     "clip",
+    "clip_fault",
     "skeleton",
     "pose",
     "calibration",

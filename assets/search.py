@@ -19,6 +19,7 @@ from assets.stamps import Earlier, Part, Parts, Progress, Stored, clip_versions,
 from assets.tables import pack
 from assets.tables import search as search_tables
 from assets.tables.motion import CanonicalClip, to_canonical_pose, to_canonical_poses
+from kernels.runs import runs_of
 from kernels.search.aligned import track
 from kernels.search.encoder import Encoder, from_arrays
 from kernels.search.measure import leave_one_out
@@ -34,6 +35,10 @@ if TYPE_CHECKING:  # JAX: loaded where something is trained, and nowhere else
 
 _MOST_WINDOWS_A_CLIP = 4
 """Chosen by hand."""
+
+_SHORTEST_S = 0.5
+"""Seconds between frames that are never shown from which they are searched, where a clip has no longer ones. Chosen by
+hand: a movement."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +62,7 @@ class _Example:
 @table_asset(
     MOTION_ENCODER,
     group="search",
-    code_version="2",
+    code_version="3",
     settings="search",
     keeps=True,
     ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose")},
@@ -122,7 +127,7 @@ def _examples(clip: Stored, canonical_pose: Stored, settings: SearchSettings) ->
                 continue
             row = rows[moved.clip_id]
             is_said = settings.labels == "folders" or (settings.labels == "clips.csv" and row["is_labelled"])
-            cut = _windows(moved.duration_s, settings)
+            cut = _shown_windows(moved, settings)
             at = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), _MOST_WINDOWS_A_CLIP)).round().astype(int))
             found += [
                 _Example(
@@ -138,15 +143,24 @@ def _examples(clip: Stored, canonical_pose: Stored, settings: SearchSettings) ->
     return found
 
 
-def _windows(duration_s: float, settings: SearchSettings) -> Float:
+def _shown_windows(moved: CanonicalClip, settings: SearchSettings) -> Float:
+    """Cut what may be shown of a clip into windows."""
     longest = max(settings.longest_whole_s, settings.window_s)
-    return windows(duration_s, window_s=settings.window_s, longest_whole_s=longest)
+    rate_hz = moved.frame_rate_hz
+    run = runs_of(~moved.is_fenced)
+    length = run[:, 1] - run[:, 0]
+    run = run[length >= min(_SHORTEST_S * rate_hz, length.max(initial=0))]
+    cut = [
+        first / rate_hz + windows((last - first) / rate_hz, window_s=settings.window_s, longest_whole_s=longest)
+        for first, last in run.tolist()
+    ]
+    return np.concatenate([*cut, np.zeros((0, 2))])
 
 
 @table_asset(
     MOTION_EMBEDDING,
     group="search",
-    code_version="2",
+    code_version="3",
     settings="search.window_s search.longest_whole_s",
     partitions=SESSION,
 )
@@ -182,7 +196,7 @@ def motion_embedding(
 
 
 def _embedded(moved: CanonicalClip, encoder: Encoder, settings: SearchSettings) -> pa.Table:
-    cut = _windows(moved.duration_s, settings)
+    cut = _shown_windows(moved, settings)
     vector = encoder.embed(moved.position_xyz_m, moved.frame_rate_hz, cut)
     followed = track(moved.position_xyz_m, moved.frame_rate_hz)
     return search_tables.from_motion_embedding(moved.clip_id, cut, vector, followed)

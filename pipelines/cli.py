@@ -314,6 +314,54 @@ def search(
         _finish(result, as_json)
 
 
+@app.command(
+    epilog=_examples(
+        "odori clips",
+        "odori clips waltz --not-method graph",
+        "odori clips --state fenced --state refused",
+        "odori clips --label spin --style salsa --method hmm",
+        "odori clips --json",
+    )
+)
+def clips(
+    song: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="SONG", help="Danceable to this song: its licences and tempo count.", show_default=False
+        ),
+    ] = None,
+    studio: StudioOption = None,
+    label: Annotated[
+        list[str] | None, typer.Option("--label", help="Only clips of this label; may be repeated.")
+    ] = None,
+    style: Annotated[
+        list[str] | None, typer.Option("--style", help="Only clips of this style; may be repeated.")
+    ] = None,
+    state: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--state", help="Only clips in this state: read, refused, new, changed, mended, fenced or doubtful."
+        ),
+    ] = None,
+    method: Annotated[
+        str, typer.Option("--method", help="Only clips this method can dance: graph, matching or hmm.")
+    ] = "",
+    not_method: Annotated[
+        str, typer.Option("--not-method", help="Only clips this method cannot dance, each with the reason.")
+    ] = "",
+    as_json: JsonOption = False,
+) -> None:
+    """List the clips: label, style, state, what is wrong, and which methods can dance them or why not.
+
+    Nothing is built: what 'odori build' found is told. Faults and their verdicts: docs/clip-health.md.
+    """
+    from pipelines.commands.list_clips import ClipFilter, list_clips
+
+    with _Trouble(as_json):
+        wanted = ClipFilter(label or (), style or (), state or (), method, not_method)
+        _finish(list_clips(_folder(studio), song, wanted), as_json)
+
+
 @app.command(epilog=_examples("odori calibrate take.parquet", "odori calibrate take.csv --bvh take.bvh"))
 def calibrate(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="A suit recording: .parquet or .csv.")],

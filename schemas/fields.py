@@ -20,6 +20,7 @@ PATH = Column("path", pa.string(), "Source file, relative to the studio.")
 SOURCE_SHA256 = Column("source_sha256", pa.string(), "Hash of the source file's bytes, hexadecimal.")
 STATE = Column("state", pa.string(), "Whether the source was read or refused.", values=("read", "refused"))
 REASON = Column("reason", pa.string(), "Why it was refused, one sentence; null when it was read.", is_optional=True)
+REASON_OF_FAULT = Column("reason", pa.string(), "What was found, with its figure, and what would help.")
 DURATION_S = Column("duration_s", pa.float64(), "Length; 0 when refused.")
 
 LABEL = Column("label", pa.string(), "What is danced or done, from clips.csv or the folder's name.")
@@ -34,6 +35,8 @@ ROTATION_WXYZ = Column(
     "rotation_wxyz", QUATERNIONS, "Rotation of each joint local to its parent; the root's in the world."
 )
 POSITION_XYZ_M = Column("position_xyz_m", VECTORS, "World position of each joint.")
+
+IS_FENCED = Column("is_fenced", pa.bool_(), "Whether it is never shown: the clip is at fault there, or cut off.")
 
 BEAT_INDEX = Column("beat_index", pa.int32(), "Beat of its clip or song, from 0.")
 CONFIDENCE_RATIO = Column("confidence", pa.float32(), "How sure the detector is, 0 to 1.")

@@ -1,4 +1,4 @@
-"""Tables of clips: the files, their skeletons and poses, their beats."""
+"""Tables of clips: the files, what is wrong with them, their skeletons and poses, their beats."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from schemas.table import Column, Table
 
 CLIP = Table(
     name="clip",
-    version=4,
+    version=5,
     meaning="One file of motion under clips/.",
     key=("clip_id", "path"),
     columns=(
@@ -27,8 +27,12 @@ CLIP = Table(
         f.LICENCE,
         Column("performed_to", pa.string(), "Song it was danced to, from clips.csv; empty when not said."),
         Column("performed_offset_s", pa.float64(), "Time of that song at the first frame, from clips.csv; else 0."),
+        Column(
+            "health", pa.string(), "What clips.csv says of its health; 'ok': it is not examined.", values=("ok", "")
+        ),
         f.STATE,
         f.REASON,
+        Column("danceability_ratio", pa.float32(), "Share of its frames that may be shown; 0 when refused."),
         Column("joint_count", pa.int32(), "Joints of the source rig; 0 when refused."),
         Column("metres_per_unit", pa.float64(), "Metres one unit of the file stands for, inferred from body height."),
         Column("up_axis", pa.string(), "Axis that points up in the file, inferred; empty when refused."),
@@ -36,6 +40,30 @@ CLIP = Table(
         Column("naming_family", pa.string(), "Which table of joint names fitted, or 'topology'."),
         Column("source_format", pa.string(), "What kind of file it is.", values=("bvh", "suit", "")),
         Column("warnings", pa.list_(pa.string()), "What is doubtful about a clip that was read, one sentence each."),
+    ),
+)
+
+VERDICTS = ("mended", "fenced", "doubtful", "refused")
+
+CLIP_FAULT = Table(
+    name="clip_fault",
+    version=1,
+    meaning="One fault of one clip: what was found where, and what became of it.",
+    key=("clip_id", "fault_index"),
+    columns=(
+        f.CLIP_ID,
+        Column("fault_index", pa.int32(), "Fault of its clip, from 0, in order of time."),
+        Column("fault_kind", pa.string(), "What is wrong; docs/clip-health.md explains each kind."),
+        Column("joint_name", pa.string(), "Joint in the source file; empty for the whole body."),
+        Column("start_s", pa.float64(), "Time of its first frame in the clip."),
+        Column("end_s", pa.float64(), "Time of its last frame in the clip; that frame is at fault too."),
+        Column(
+            "verdict",
+            pa.string(),
+            "Mended: put right, and danced; fenced: never shown; doubtful: danced; refused: nothing of the clip is.",
+            values=VERDICTS,
+        ),
+        f.REASON_OF_FAULT,
     ),
 )
 
@@ -61,7 +89,7 @@ SKELETON = Table(
 
 POSE = Table(
     name="pose",
-    version=1,
+    version=2,
     meaning="One frame of one clip on its own skeleton, in metres, Y up.",
     key=("clip_id", "frame_index"),
     columns=(
@@ -76,20 +104,21 @@ POSE = Table(
             "Local position of each joint where the rig moves its joints; null when they stay at their offsets.",
             is_optional=True,
         ),
+        f.IS_FENCED,
     ),
 )
 
 CANONICAL_POSE = Table(
     name="canonical_pose",
-    version=1,
+    version=2,
     meaning="One frame of one clip on the canonical skeleton; schema metadata `joints` has the order.",
     key=("clip_id", "frame_index"),
-    columns=(f.CLIP_ID, f.FRAME_INDEX, f.TIME_S, f.ROOT_XYZ_M, f.ROTATION_WXYZ, f.POSITION_XYZ_M),
+    columns=(f.CLIP_ID, f.FRAME_INDEX, f.TIME_S, f.ROOT_XYZ_M, f.ROTATION_WXYZ, f.POSITION_XYZ_M, f.IS_FENCED),
 )
 
 MOTION_FEATURE = Table(
     name="motion_feature",
-    version=1,
+    version=2,
     meaning="What one clip does at one instant, 120 a second.",
     key=("clip_id", "frame_index"),
     columns=(
@@ -108,6 +137,7 @@ MOTION_FEATURE = Table(
         ),
         Column("is_left_contact", pa.bool_(), "Whether the left foot stands on the floor."),
         Column("is_right_contact", pa.bool_(), "Whether the right foot stands on the floor."),
+        f.IS_FENCED,
     ),
 )
 

@@ -22,6 +22,9 @@ COLUMNS: dict[str, tuple[str, ...]] = {
     "licence": ("licence", "license"),
     "performed_to": ("performed_to",),
     "performed_offset_s": ("performed_offset_s", "offset_s"),
+    "health": ("health",),
+    "start_s": ("start_s",),
+    "end_s": ("end_s",),
 }
 
 
@@ -31,7 +34,8 @@ class Facts:
 
     ``is_labelled`` is false where the label only stands in for one that was not said.
     ``performed_to`` is the song it was danced to (key, file name or stem; ``none`` for no song of the studio),
-    ``performed_offset_s`` the time of the song at the clip's first frame.
+    ``performed_offset_s`` the time of the song at the clip's first frame. ``health`` is ``ok`` where the studio answers
+    for the clip itself. What lies before ``start_s`` and after ``end_s`` is not danced; None where it is not said.
     """
 
     label: str = ""
@@ -41,6 +45,9 @@ class Facts:
     performed_to: str = ""
     performed_offset_s: float = 0.0
     is_labelled: bool = True
+    health: str = ""
+    start_s: float | None = None
+    end_s: float | None = None
 
 
 def is_clips_csv(name: str) -> bool:
@@ -68,7 +75,8 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
     Raises
     ------
     FormatError
-        If it is not UTF-8, has no file column, names a file twice with different facts, or an offset is no number.
+        If it is not UTF-8, has no file column, names a file twice with different facts, an offset or a time is no
+        number, a take ends before it starts, or a health is not ``ok``.
     """
     try:
         text = data.decode("utf-8-sig")
@@ -89,8 +97,8 @@ def parse(data: bytes, path: str = "clips.csv") -> dict[str, Facts]:
             if not file:
                 continue
             texts: dict[str, Any] = {k: (row.get(c) or "").strip() for k, c in chosen.items() if c and k != "file"}
-            offset_s = _seconds(texts.pop("performed_offset_s", ""), path, rows.line_num)
-            said = Facts(**texts, performed_offset_s=offset_s)
+            offset_s = _seconds("performed_offset_s", texts.pop("performed_offset_s", ""), path, rows.line_num)
+            said = Facts(**texts | _take(texts, path, rows.line_num), performed_offset_s=offset_s or 0.0)
             if facts.setdefault(file, said) != said:
                 raise FormatError(path, rows.line_num, f"want each file once, got {file!r} again with other facts")
     except csv.Error as error:
@@ -103,13 +111,29 @@ def _composed(name: str) -> str:
     return unicodedata.normalize("NFC", name)
 
 
-def _seconds(text: str, path: str, line: int) -> float:
+def _take(texts: Mapping[str, str], path: str, line: int) -> dict[str, Any]:
+    """Read what a studio says of a take's health, and of where it starts and ends."""
+    start_s, end_s = (_seconds(name, texts.get(name, ""), path, line) for name in ("start_s", "end_s"))
+    if end_s is not None and end_s <= max(start_s or 0.0, 0.0):
+        raise FormatError(
+            path, line, f"want end_s after start_s, got {start_s or 0:g} to {end_s:g}; swap or correct them"
+        )
+    health = texts.get("health", "").lower()
+    if health not in ("", "ok"):
+        raise FormatError(path, line, f"want health 'ok' or nothing, got {health!r}; 'ok': dance it as it is")
+    return {"health": health, "start_s": start_s, "end_s": end_s}
+
+
+def _seconds(name: str, text: str, path: str, line: int) -> float | None:
+    """Read a number of seconds; None where nothing is said."""
+    if not text:
+        return None
     try:
-        value = float(text or 0.0)
+        value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise FormatError(path, line, f"want performed_offset_s in seconds, got {text!r}; write a number such as 1.25")
+        raise FormatError(path, line, f"want {name} in seconds, got {text!r}; write a number such as 1.25")
     return value
 
 

@@ -39,7 +39,7 @@ def image_of(moved: CanonicalClip) -> CanonicalClip:
     """
     root, turned = mirror(moved.root_xyz_m, moved.rotation_wxyz)
     position, _ = forward(CANONICAL, root, turned)
-    return CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position)
+    return CanonicalClip(mirrored(moved.clip_id), moved.frame_rate_hz, root, turned, position, moved.is_fenced)
 
 
 def named_clips(canonical_pose: Stored, names: Collection[str]) -> Iterator[CanonicalClip]:

@@ -10,6 +10,7 @@ import pyarrow as pa
 from assets.tables.motion import to_canonical_pose
 from kernels.motion.key_poses import KeyPoses, angular_speed, key_poses, pose_vectors
 from kernels.motion.velocity import usable_frames
+from kernels.runs import touches
 from kernels.skeleton import kinematics
 from kernels.skeleton.canonical import CANONICAL
 from kernels.types import Float
@@ -26,7 +27,7 @@ class Cut:
 
 
 def cut(rows: pa.Table, settings: BasicMotionSettings) -> Cut:
-    """Cut one clip into motions; frames that no body moves to, at its ends, are left out.
+    """Cut one clip into motions; those that touch a fenced frame, or one no body moves to, are left out.
 
     Parameters
     ----------
@@ -49,7 +50,8 @@ def cut(rows: pa.Table, settings: BasicMotionSettings) -> Cut:
         first_s=first / moved.frame_rate_hz,
     )
     end_s = np.minimum(found.end_s, moved.duration_s)
-    found = KeyPoses(found.start_s, found.peak_s, end_s)
+    is_whole = ~touches(moved.is_fenced, moved.frame_rate_hz, found.start_s, end_s)
+    found = KeyPoses(found.start_s[is_whole], found.peak_s[is_whole], end_s[is_whole])
     return Cut(
         moved.clip_id,
         found,

@@ -24,14 +24,17 @@ from schemas.music import MUSIC_FEATURE, MUSIC_REPEAT, MUSIC_SEGMENT
 Rhythm = NDArray[np.float32]
 
 
-def from_motion_feature(clip_id: str, found: MotionFeatures, contact: NDArray[np.bool_]) -> pa.Table:
-    """Pack a clip's features, F rows; ``contact`` is (F, 2), left first.
+def from_motion_feature(
+    clip_id: str, found: MotionFeatures, contact: NDArray[np.bool_], is_fenced: NDArray[np.bool_]
+) -> pa.Table:
+    """Pack a clip's features, F rows.
 
     Parameters
     ----------
     clip_id : str
     found : MotionFeatures, of F values
     contact : (F, 2) bool, left first
+    is_fenced : (F,) bool, values of moments that are never shown
 
     Returns
     -------
@@ -48,6 +51,7 @@ def from_motion_feature(clip_id: str, found: MotionFeatures, contact: NDArray[np
         pa.array(found.peak_effort_rad_per_s, pa.float32()),
         pa.array(contact[:, 0]),
         pa.array(contact[:, 1]),
+        pa.array(is_fenced),
     ]
     return MOTION_FEATURE.check(pa.table(columns, schema=MOTION_FEATURE.arrow))
 

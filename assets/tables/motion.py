@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from assets.tables.pack import (
     by_clip,
@@ -16,12 +17,15 @@ from assets.tables.pack import (
     vector,
     vectors,
 )
+from kernels.health.verdicts import ClipFault
 from kernels.motion.motion_beats import MotionBeats
 from kernels.skeleton.canonical import JOINTS
 from kernels.skeleton.naming import JointMapping
 from kernels.skeleton.retarget import CanonicalMotion
 from kernels.types import Clip, Float, Skeleton
-from schemas.motion import CANONICAL_POSE, MOTION_BEAT, POSE, SKELETON
+from schemas.motion import CANONICAL_POSE, CLIP_FAULT, MOTION_BEAT, POSE, SKELETON
+
+Mask = NDArray[np.bool_]
 
 
 def from_skeleton(clip_id: str, skeleton: Skeleton, mapping: JointMapping) -> pa.Table:
@@ -55,8 +59,24 @@ def to_skeleton(rows: pa.Table) -> tuple[Skeleton, JointMapping]:
     return skeleton, JointMapping({name: driven[name] for name in JOINTS if name in driven}, "stored")
 
 
-def from_pose(clip_id: str, clip: Clip) -> pa.Table:
-    """Pack a clip on its own skeleton, F rows."""
+def from_clip_fault(clip_id: str, faults: Sequence[ClipFault], frame_rate_hz: float) -> pa.Table:
+    """Pack the faults of a clip, a row each, none where nothing is wrong."""
+    n = len(faults)
+    columns = [
+        pa.array([clip_id] * n, pa.string()),
+        pa.array(np.arange(n), pa.int32()),
+        pa.array([fault.kind for fault in faults], pa.string()),
+        pa.array([fault.joint for fault in faults], pa.string()),
+        pa.array([fault.first / frame_rate_hz for fault in faults], pa.float64()),
+        pa.array([fault.last / frame_rate_hz for fault in faults], pa.float64()),
+        pa.array([fault.verdict for fault in faults], pa.string()),
+        pa.array([fault.reason for fault in faults], pa.string()),
+    ]
+    return CLIP_FAULT.check(pa.table(columns, schema=CLIP_FAULT.arrow))
+
+
+def from_pose(clip_id: str, clip: Clip, is_fenced: Mask | None = None) -> pa.Table:
+    """Pack a clip on its own skeleton, F rows; without a fence every frame may be shown."""
     f = clip.n_frames
     moved = clip.translation_xyz_m
     columns = [
@@ -66,6 +86,7 @@ def from_pose(clip_id: str, clip: Clip) -> pa.Table:
         vector(clip.root_xyz_m),
         vectors(clip.rotation_wxyz),
         pa.nulls(f, POSE.arrow.field("translation_xyz_m").type) if moved is None else vectors(moved),
+        pa.array(np.zeros(f, bool) if is_fenced is None else is_fenced, pa.bool_()),
     ]
     return POSE.check(pa.table(columns, schema=POSE.arrow))
 
@@ -82,15 +103,21 @@ def to_pose(rows: pa.Table, skeleton: Skeleton) -> Clip:
     )
 
 
+def to_fence(rows: pa.Table) -> Mask:
+    """Unpack which frames of one clip are never shown, (F,)."""
+    return to_numbers(rows["is_fenced"]).astype(bool)
+
+
 @dataclass(frozen=True, eq=False)
 class CanonicalClip:
-    """One clip on the canonical skeleton: (F, 3), (F, 22, 4) local, (F, 22, 3) world."""
+    """One clip on the canonical skeleton: (F, 3), (F, 22, 4) local, (F, 22, 3) world; (F,), what is never shown."""
 
     clip_id: str
     frame_rate_hz: float
     root_xyz_m: Float
     rotation_wxyz: Float
     position_xyz_m: Float
+    is_fenced: Mask
 
     @property
     def duration_s(self) -> float:
@@ -98,7 +125,9 @@ class CanonicalClip:
         return max(len(self.root_xyz_m) - 1, 0) / self.frame_rate_hz
 
 
-def from_canonical_pose(clip_id: str, frame_rate_hz: float, motion: CanonicalMotion) -> pa.Table:
+def from_canonical_pose(
+    clip_id: str, frame_rate_hz: float, motion: CanonicalMotion, is_fenced: Mask | None = None
+) -> pa.Table:
     """Pack a clip on the canonical skeleton, F rows; the joints' order goes into the schema metadata."""
     f = len(motion.root_xyz_m)
     columns = [
@@ -108,6 +137,7 @@ def from_canonical_pose(clip_id: str, frame_rate_hz: float, motion: CanonicalMot
         vector(motion.root_xyz_m),
         vectors(motion.rotation_wxyz),
         vectors(motion.position_xyz_m),
+        pa.array(np.zeros(f, bool) if is_fenced is None else is_fenced, pa.bool_()),
     ]
     table = CANONICAL_POSE.check(pa.table(columns, schema=CANONICAL_POSE.arrow))
     return CANONICAL_POSE.with_metadata(table, {"joints": ",".join(JOINTS)})
@@ -121,6 +151,7 @@ def to_canonical_pose(rows: pa.Table) -> CanonicalClip:
         to_array(rows["root_xyz_m"]),
         to_array(rows["rotation_wxyz"]),
         to_array(rows["position_xyz_m"]),
+        to_fence(rows),
     )
 
 
@@ -130,10 +161,18 @@ def to_canonical_poses(table: pa.Table) -> Iterator[CanonicalClip]:
         yield to_canonical_pose(rows)
 
 
-def from_motion_beat(clip_id: str, beats: MotionBeats, frame_rate_hz: float, *, first_frame: int = 0) -> pa.Table:
-    """Pack the beats of a clip, B rows, none when it has none; found in the clip from ``first_frame`` on."""
-    b = len(beats.time_s)
+def from_motion_beat(
+    clip_id: str, beats: MotionBeats, frame_rate_hz: float, *, first_frame: int = 0, is_fenced: Mask | None = None
+) -> pa.Table:
+    """Pack the beats of a clip, B rows, none when it has none; found in the clip from ``first_frame`` on.
+
+    Beats of frames that are never shown are left out.
+    """
     time_s = beats.time_s + first_frame / frame_rate_hz
+    if is_fenced is not None:
+        frame = np.round(time_s * frame_rate_hz).astype(np.int64)
+        time_s = time_s[~is_fenced[np.clip(frame, 0, len(is_fenced) - 1)]]
+    b = len(time_s)
     columns = [
         pa.array([clip_id] * b, pa.string()),
         pa.array(np.arange(b), pa.int32()),

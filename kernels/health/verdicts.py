@@ -110,3 +110,32 @@ def fence_of(faults: Iterable[ClipFault], n_frames: int) -> NDArray[np.bool_]:
         if fault.verdict == "fenced":
             is_fenced[fault.first : fault.last + 1] = True
     return is_fenced
+
+
+def within(examined: ExaminedClip, start_s: float | None, end_s: float | None) -> ExaminedClip:
+    """Cut off what lies before and after a take: those frames are never shown.
+
+    Parameters
+    ----------
+    examined : ExaminedClip of F frames
+    start_s, end_s : float, seconds of the clip, or None where the take is not cut
+
+    Returns
+    -------
+    ExaminedClip
+        With a fault a cut; refused where fewer than two frames are left.
+    """
+    clip = examined.clip
+    n, rate_hz = clip.n_frames, clip.frame_rate_hz
+    first = 0 if start_s is None else max(int(np.ceil(start_s * rate_hz - 1e-6)), 0)
+    last = n - 1 if end_s is None else min(int(np.floor(end_s * rate_hz + 1e-6)), n - 1)
+    if n and last - first < 1 and (start_s is not None or end_s is not None):
+        told = f"start_s and end_s leave nothing of its {clip.duration_s:.2f} s; correct them in clips.csv"
+        cut = (ClipFault("trimmed", "", 0, n - 1, "refused", told),)
+    else:
+        told = "cut off by clips.csv"
+        before = (ClipFault("trimmed", "", 0, first - 1, "fenced", told),) if first > 0 else ()
+        after = (ClipFault("trimmed", "", last + 1, n - 1, "fenced", told),) if last < n - 1 else ()
+        cut = (*before, *after)
+    order = sorted((*examined.faults, *cut), key=lambda fault: (fault.first, fault.last))
+    return ExaminedClip(clip, tuple(order))

@@ -13,7 +13,7 @@ where the dancer stands and faces does not count, how the body leans does.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -59,6 +59,17 @@ class MotionFeatures:
     def time_s(self) -> Float:
         """Seconds of each value."""
         return np.arange(len(self.rhythm)) / FEATURE_RATE_HZ
+
+    def without(self, is_fenced: NDArray[np.bool_]) -> MotionFeatures:
+        """Take rhythm and intensity away where nothing is shown.
+
+        Parameters
+        ----------
+        is_fenced : (F,) bool
+        """
+        return replace(
+            self, rhythm=np.where(is_fenced, 0.0, self.rhythm), intensity=np.where(is_fenced, 0.0, self.intensity)
+        )
 
 
 def at_feature_rate(values: Float, frame_rate_hz: float) -> Float:
@@ -340,3 +351,22 @@ def contacts_at_feature_rate(contact: NDArray[np.bool_], frame_rate_hz: float, n
     """
     nearest = np.rint(np.arange(n_values) * (frame_rate_hz / FEATURE_RATE_HZ)).astype(np.int64)
     return np.asarray(contact[np.clip(nearest, 0, max(len(contact) - 1, 0))], np.bool_)
+
+
+def fence_at_feature_rate(is_fenced: NDArray[np.bool_], frame_rate_hz: float, n_values: int) -> NDArray[np.bool_]:
+    """Say at 120 Hz what is never shown: a moment beside a fenced frame is fenced.
+
+    Parameters
+    ----------
+    is_fenced : (F,) bool, F >= 1 unless ``n_values`` is 0
+    frame_rate_hz : float, > 0, of ``is_fenced``
+    n_values : int, >= 0
+
+    Returns
+    -------
+    (n_values,) bool
+        Beyond the last frame, as in it.
+    """
+    at = np.clip(np.arange(n_values) * (frame_rate_hz / FEATURE_RATE_HZ), 0, max(len(is_fenced) - 1, 0))
+    before, after = np.floor(at + 1e-6).astype(np.int64), np.ceil(at - 1e-6).astype(np.int64)
+    return np.asarray(is_fenced[before] | is_fenced[after], np.bool_)

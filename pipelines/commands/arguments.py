@@ -7,9 +7,8 @@ from typing import Any
 
 from assets.dancing.methods import USUAL
 from assets.formats.errors import FormatError
-from assets.sources.sources import SongFile
+from assets.sources.sources import SongFile, Sources
 from pipelines.commands.search_motions import by_likeness
-from pipelines.freshness import Freshness
 from pipelines.studio.files import StudioError
 from pipelines.studio.folder import StudioFolder
 from schemas.pins import parse_pin
@@ -32,9 +31,9 @@ def briefed_method(studio: StudioFolder, song: SongFile) -> str:
         return USUAL
 
 
-def wanted_songs(state: Freshness, wanted: Sequence[str], studio: StudioFolder) -> list[SongFile]:
+def wanted_songs(sources: Sources, wanted: Sequence[str], studio: StudioFolder) -> list[SongFile]:
     """Find songs by key, file name, stem or path; LookupError naming the nearest where there is none."""
-    songs = {key: state.sources.song(key) for key in state.sources.songs_by_key()}
+    songs = {key: sources.song(key) for key in sources.songs_by_key()}
     if not songs:
         raise StudioError(f"{studio.root}: want a song under songs/, got none; put one there")
     if list(wanted) == ["all"]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
 
 from assets.dancing import pose_pins
@@ -138,8 +139,12 @@ class _Posed:
         self._played = played
         self._lineage = pl.DataFrame(lake.table("frame_lineage", key))
         frames = lake.table("dance_pose", key)
-        moved = [pack.to_array(frames[name]) for name in ("root_xyz_m", "rotation_wxyz", "position_xyz_m")]
-        self._dance = CanonicalClip(key, pack.frame_rate_hz(frames), *moved)
+        root, turned, place = (
+            pack.to_array(frames[name]) for name in ("root_xyz_m", "rotation_wxyz", "position_xyz_m")
+        )
+        self._dance = CanonicalClip(
+            key, pack.frame_rate_hz(frames), root, turned, place, np.zeros(frames.num_rows, bool)
+        )
         stored = StoredTable(lake, "canonical_pose", lake.keys("canonical_pose"))
         self._poses = poses_of(stored, studio.settings())
         self._nodes = pl.DataFrame(lake.table("motion_graph_node"))

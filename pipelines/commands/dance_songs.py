@@ -44,7 +44,7 @@ def dance_songs(
     if not 1 <= alternatives <= MOST_ALTERNATIVES:
         raise StudioError(f"--alternatives: want 1 to {MOST_ALTERNATIVES}, got {alternatives}")
     work = Session(studio, progress)
-    songs = wanted_songs(work.state, wanted, studio)
+    songs = wanted_songs(work.state.sources, wanted, studio)
     character = casting.named(studio, work.state.sources, character)
     if out is not None and len(songs) > 1:
         raise StudioError(f"--out: want one song, got {len(songs)}; leave it out, the dances are under {studio.dances}")

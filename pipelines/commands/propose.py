@@ -94,7 +94,7 @@ def propose_pins(
     studio = existing(root)
     pins = pin_texts(pins, root, progress)
     work = Session(studio, progress)
-    songs = wanted_songs(work.state, [wanted], studio)
+    songs = wanted_songs(work.state.sources, [wanted], studio)
     if len(songs) > 1:
         raise StudioError(f"--propose: want one song, got {len(songs)}")
     report = work.run_before_dance(songs[0].key, USUAL)

@@ -236,6 +236,6 @@ def explain_dance(root: Path, danced: str, *, at_s: float | None) -> Outcome:
     studio = existing(root)
     state = freshness(studio)
     text, bar, method = danced.partition("|")
-    song = wanted_songs(state, [text], studio)[0]
+    song = wanted_songs(state.sources, [text], studio)[0]
     key = find_dance(studio, f"{song.key}{bar}{method}", briefed_method(studio, song))
     return explain(from_lake(studio, key), at_s)

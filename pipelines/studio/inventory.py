@@ -1,12 +1,13 @@
 """What files a studio has, and what became of each: read, refused, new, changed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from assets.sources.sources import Sources
 from assets.stamps import content_version
+from assets.tables.pack import by_clip
 from pipelines.studio.lake import Lake
-from schemas.motion import CANONICAL_POSE
+from schemas.motion import CANONICAL_POSE, CLIP_FAULT
 from schemas.music import SONG
 
 _NO_POSE = content_version(CANONICAL_POSE.empty())
@@ -30,6 +31,7 @@ def clips_and_doubts(
     doubts : ``path`` and ``warning``
     """
     stored = clip_rows(lake) if stored is None else stored
+    troubles = _troubles(lake)
     unplaced = {session: _unplaced(lake, session) for session in lake.keys("canonical_pose")}
     found: list[dict[str, Any]] = []
     doubts: list[dict[str, str]] = []
@@ -39,10 +41,38 @@ def clips_and_doubts(
         seen = _seen(row, clip.sha256, clip.problem)
         if seen["state"] == "read" and clip.key in unplaced.get(clip.session, ()):
             seen = {"state": "refused", "reason": "its motion could not be brought to the canonical skeleton"}
-        warnings = row["warnings"] if row is not None and seen["state"] == "read" else []
+        warnings = (
+            [*row["warnings"], *troubles.get(clip.key, ())] if row is not None and seen["state"] == "read" else []
+        )
         found.append({"path": path, "key": clip.key, "session": clip.session, **seen})
         doubts += [{"path": path, "warning": sentence} for sentence in warnings]
     return found, doubts
+
+
+QUIET_KINDS = ("fast", "trimmed")
+"""Kinds of fault nobody has to look at: motion that is real, and what the studio cut off itself."""
+
+
+def _troubles(lake: Lake) -> dict[str, list[str]]:
+    """Say what was mended, fenced or doubted of each clip, a sentence for each kind."""
+    found: dict[str, list[str]] = {}
+    for session in lake.keys(CLIP_FAULT.name):
+        if lake.stamp(CLIP_FAULT.name, session) is None:
+            continue
+        for clip, rows in by_clip(lake.table(CLIP_FAULT.name, session)).items():
+            alike: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
+            for row in rows.to_pylist():
+                if row["fault_kind"] not in QUIET_KINDS and row["verdict"] != "refused":
+                    alike.setdefault((row["verdict"], row["fault_kind"]), []).append(row)
+            found[clip] = [_trouble(verdict, same) for (verdict, _), same in alike.items()]
+    return found
+
+
+def _trouble(verdict: str, same: Sequence[Mapping[str, Any]]) -> str:
+    """Say one kind of fault of a clip: the first in full, and how many more there are."""
+    first = same[0]
+    more = f" (and {len(same) - 1} more of the kind)" if len(same) > 1 else ""
+    return f"{verdict} at {first['start_s']:.2f} s: {first['reason']}{more}"
 
 
 def clip_rows(lake: Lake) -> dict[str, dict[str, Any]]:

@@ -130,3 +130,39 @@ def test_a_clip_refused_by_its_folder_is_not_opened(tmp_path):
     (row,) = parts["clip"].table.to_pylist()
     assert (row["state"], row["reason"], row["source_format"]) == ("refused", "too large", "")
     assert parts["pose"].metadata["computed_clips"] == 0
+
+
+@pytest.mark.parametrize(
+    ("facts", "first", "last"),
+    [({"start_s": 0.5}, 0.5, None), ({"end_s": 1.0}, 0.0, 1.0), ({"start_s": 0.5, "end_s": 1.0}, 0.5, 1.0)],
+)
+def test_what_clips_csv_cuts_off_is_fenced_and_said(read_as, facts, first, last):
+    parts = read_as(4, "0", **facts)
+    pose = parts["pose"].table.to_pydict()
+    shown = [t for t, is_fenced in zip(pose["time_s"], pose["is_fenced"], strict=True) if not is_fenced]
+    assert shown[0] == pytest.approx(first)
+    assert shown[-1] == pytest.approx(pose["time_s"][-1] if last is None else last)
+    faults = parts["clip_fault"].table.to_pylist()
+    assert {(f["fault_kind"], f["verdict"]) for f in faults} == {("trimmed", "fenced")}
+    assert len(faults) == len(facts)
+    (row,) = parts["clip"].table.to_pylist()
+    assert row["danceability_ratio"] == pytest.approx(len(shown) / len(pose["time_s"]))
+
+
+def test_a_take_cut_down_to_nothing_is_refused(read_as):
+    parts = read_as(4, "0", start_s=99.0)
+    (row,) = parts["clip"].table.to_pylist()
+    assert row["state"] == "refused"
+    assert "start_s and end_s leave nothing" in row["reason"]
+    assert parts["clip_fault"].table["verdict"].to_pylist() == ["refused"]
+    assert parts["pose"].table.num_rows == 0
+
+
+def test_a_clip_is_examined_anew_when_its_facts_of_health_change_and_only_then(read_as):
+    first = read_as(4, "0")
+    again = read_as(4, "0", Stored(**first), style="other")
+    cut = read_as(4, "0", Stored(**first), end_s=1.0)
+    answered = read_as(4, "0", Stored(**first), health="ok")
+    counted = [parts["pose"].metadata["computed_clips"] for parts in (again, cut, answered)]
+    assert counted == [0, 1, 1]
+    assert answered["clip"].table["health"].to_pylist() == ["ok"]

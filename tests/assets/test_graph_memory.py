@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from assets.graph_memory import Beats, keep, near_pairs, recall
+from assets.graph_memory import Beats, keep, near_pairs, nodes_of, recall
 from kernels.graph.beat_features import beat_features
-from kernels.graph.nodes import beat_nodes
 from kernels.skeleton.kinematics import place
 from kernels.synthetic.dancer import take
 
@@ -29,11 +28,12 @@ def beats(name, version="1"):
     time_s = np.arange(1, 8) * 0.5
     features = beat_features(made.clip.rotation_wxyz, position, frame_rate_hz=made.clip.frame_rate_hz, time_s=time_s)
     ones = np.ones(len(time_s))
-    return Beats(name, version, made.clip.duration_s, time_s, features, 0.5 * ones, 2 * ones, ones, ones)
+    whole = np.zeros(len(time_s)), np.full(len(time_s), made.clip.duration_s)
+    return Beats(name, version, time_s, *whole, features, 0.5 * ones, 2 * ones, ones, ones)
 
 
 def listed(clips, earlier=None):
-    nodes = beat_nodes([b.time_s for b in clips], [b.duration_s for b in clips])
+    nodes = nodes_of(clips)
     asked = {"n_nearest": 5, "min_margin_s": 0.2}
     from kernels.graph.distance import pose_distance
 

@@ -48,7 +48,9 @@ def stored_poses():
             arm = JOINTS.index("leftUpperArm")
             turned[:, arm, 0], turned[:, arm, 3] = np.cos(arm_rad / 2), np.sin(arm_rad / 2)
             root = np.array([0.0, 0.94, 0.0]) + way
-            clip = CanonicalClip(name, frame_rate_hz, root, turned, forward(CANONICAL, root, turned)[0])
+            clip = CanonicalClip(
+                name, frame_rate_hz, root, turned, forward(CANONICAL, root, turned)[0], np.zeros(len(root), bool)
+            )
             rows[name] = from_canonical_pose(name, frame_rate_hz, clip)
         return _InMemory(rows)
 

@@ -18,6 +18,7 @@ from kernels.types import BeatGrid, MotionGraph
 from schemas.pins import parse_pin
 
 RATE_HZ, N_FRAMES = 30.0, 151
+NOTHING_FENCED = np.zeros(N_FRAMES, bool)
 ONE, TWO, HALF = (STEPS.index(step) for step in ((1, 1), (2, 1), (1, 2)))
 
 
@@ -40,7 +41,7 @@ CLIPS = {"day-a": (1.2, 0.31), "day-b": (1.2, 0.23), "day-c": (0.02, 0.5)}
 def poses(in_memory):
     rows = {}
     for name, how in CLIPS.items():
-        rows[name] = from_canonical_pose(name, RATE_HZ, CanonicalClip(name, RATE_HZ, *swinging(*how)))
+        rows[name] = from_canonical_pose(name, RATE_HZ, CanonicalClip(name, RATE_HZ, *swinging(*how), NOTHING_FENCED))
     return ClipPoses(in_memory(rows))
 
 
@@ -183,11 +184,16 @@ def test_told_of_a_finished_dance(graph, poses, clip, at_s, is_kept):
             "is_kept": [True] * 20,
         }
     )
-    shown = CanonicalClip("dance", RATE_HZ, *swinging(*CLIPS[clip]))
+    shown = CanonicalClip("dance", RATE_HZ, *swinging(*CLIPS[clip]), NOTHING_FENCED)
     shift = round((at_s - 2.0) * RATE_HZ)
     frame = np.clip(np.arange(N_FRAMES) + shift, 0, N_FRAMES - 1)
     dance = CanonicalClip(
-        "dance", RATE_HZ, shown.root_xyz_m[frame], shown.rotation_wxyz[frame], shown.position_xyz_m[frame]
+        "dance",
+        RATE_HZ,
+        shown.root_xyz_m[frame],
+        shown.rotation_wxyz[frame],
+        shown.position_xyz_m[frame],
+        NOTHING_FENCED,
     )
     wish = parse_pin("2=pose:day-a@1.7")
     told = shown_pose(wish, 2.0, lineage(clip, at_s), dance, ClipPoses(poses.stored, 0.3), nodes)

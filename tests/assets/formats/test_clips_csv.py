@@ -1,5 +1,6 @@
 """What a studio says of its clips, in our columns and in those of data sets."""
 
+import re
 import unicodedata
 
 import pytest
@@ -82,3 +83,26 @@ def test_accents_may_be_put_together_or_apart(forms):
     facts = parse(f"file,label\n{said},spin\n".encode())
     for folders, name in ((stored.split("/")[:1], stored.split("/")[1]), ([], stored.split("/")[1])):
         assert facts[row_of(facts, folders, name)].label == "spin"
+
+
+def test_a_take_within_a_file_and_what_is_answered_for():
+    said = parse(b"file,health,start_s,end_s\na.bvh,OK,1.5,4\nb.bvh,,,2\nc.bvh,,,\n")
+    assert [(f.health, f.start_s, f.end_s) for f in said.values()] == [
+        ("ok", 1.5, 4.0),
+        ("", None, 2.0),
+        ("", None, None),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("row", "word"),
+    [
+        ("a.bvh,fine,,", "want health 'ok' or nothing, got 'fine'"),
+        ("a.bvh,,4,4", "want end_s after start_s, got 4 to 4"),
+        ("a.bvh,,,0", "want end_s after start_s, got 0 to 0"),
+        ("a.bvh,,soon,", "want start_s in seconds, got 'soon'"),
+    ],
+)
+def test_a_take_that_cannot_be_is_refused_by_its_line(row, word):
+    with pytest.raises(FormatError, match=re.escape(f"clips.csv:2: {word}")):
+        parse(f"file,health,start_s,end_s\n{row}\n".encode())

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kernels.graph.nodes import BeatNodes, beat_nodes
+from kernels.graph.nodes import BeatNodes, beat_nodes, stretch_around
 
 
 @pytest.fixture
@@ -50,25 +50,25 @@ def test_errors():
     with pytest.raises(ValueError, match="sorted by clip"):
         beat_nodes([np.array([0.5, 0.5])], [1.0])
     with pytest.raises(ValueError, match="sorted by clip"):
-        BeatNodes(np.array([1, 0]), np.zeros(2), np.ones(2))
-    with pytest.raises(ValueError, match="0 to the clip's duration"):
+        BeatNodes(np.array([1, 0]), np.zeros(2), np.zeros(2), np.ones(2))
+    with pytest.raises(ValueError, match="within the clip's stretch"):
         beat_nodes([np.array([1.5])], [1.0])
     with pytest.raises(ValueError, match="time_s: want"):
-        BeatNodes(np.zeros(2, int), np.zeros(1), np.ones(2))
+        BeatNodes(np.zeros(2, int), np.zeros(1), np.zeros(2), np.ones(2))
 
 
 def test_a_beat_may_lie_a_last_bit_past_its_clip_and_no_further():
     assert len(beat_nodes([np.array([1.0 + 5e-7])], [1.0])) == 1
-    with pytest.raises(ValueError, match="0 to the clip's duration"):
+    with pytest.raises(ValueError, match="within the clip's stretch"):
         beat_nodes([np.array([1.00001])], [1.0])
-    with pytest.raises(ValueError, match="0 to the clip's duration"):
+    with pytest.raises(ValueError, match="within the clip's stretch"):
         beat_nodes([np.array([-0.1])], [1.0])
     with pytest.raises(ValueError, match="sorted by clip"):
-        BeatNodes(np.array([-1]), np.zeros(1), np.ones(1))
+        BeatNodes(np.array([-1]), np.zeros(1), np.zeros(1), np.ones(1))
 
 
 def test_clips_may_begin_at_the_same_time_and_be_left_out(nodes):
-    other = BeatNodes(np.array([0, 3]), np.array([0.5, 0.5]), np.ones(2))
+    other = BeatNodes(np.array([0, 3]), np.array([0.5, 0.5]), np.zeros(2), np.ones(2))
     assert other.next_node.tolist() == [-1, -1]
     assert [part.tolist() for part in other.same_moment(9.0)] == [[0, 1], [1, 2]]
 
@@ -79,3 +79,32 @@ def test_a_margin_is_kept_to_the_bit():
     assert nodes.may_enter(0.25).tolist() == [True, True, False]
     assert nodes.may_leave(0.2501).tolist() == [False, True, False]
     assert nodes.may_enter(0.2501).tolist() == [False, True, False]
+
+
+@pytest.fixture
+def fenced():
+    """One clip of 4 s at 10 Hz, a beat every half second, frames 12 to 14 never shown."""
+    time_s, is_fenced = np.array([0.5, 1.0, 2.0, 2.5, 3.0]), np.zeros(41, bool)
+    is_fenced[12:15] = True
+    return BeatNodes(np.zeros(5, np.int64), time_s, *stretch_around(time_s, is_fenced, 10.0))
+
+
+def test_no_beat_goes_on_across_frames_that_are_never_shown(fenced):
+    assert fenced.start_s.tolist() == [0.0, 0.0, 1.5, 1.5, 1.5]
+    np.testing.assert_allclose(fenced.end_s, [1.1, 1.1, 4.0, 4.0, 4.0])
+    assert fenced.next_node.tolist() == [1, -1, 3, 4, -1]
+    assert fenced.previous_node.tolist() == [-1, 0, -1, 2, 3]
+
+
+def test_no_blend_reaches_into_frames_that_are_never_shown(fenced):
+    assert fenced.may_leave(0.2).tolist() == [False, False, False, True, True]
+    assert fenced.may_leave(0.09).tolist() == [False, True, False, True, True]
+    assert fenced.may_enter(0.6).tolist() == [False, False, False, True, False]
+
+
+def test_a_stretch_of_a_beat_between_two_frames_holds_it():
+    is_fenced = np.array([0, 0, 0, 1, 0], bool)
+    start_s, end_s = stretch_around(np.array([0.23, 0.38]), is_fenced, 10.0)
+    np.testing.assert_allclose(start_s, [0.0, 0.38])
+    np.testing.assert_allclose(end_s, [0.23, 0.4])
+    assert [len(part) for part in stretch_around(np.zeros(0), is_fenced, 10.0)] == [0, 0]

@@ -13,12 +13,12 @@ def folder(built):
 
 @pytest.mark.parametrize("text", ["beat", "beat.wav", "songs/beat.wav", "elsewhere/beat.wav", "all"])
 def test_a_song_is_found_by_key_name_or_path(folder, text):
-    assert [song.key for song in wanted_songs(freshness(folder), [text], folder)] == ["beat"]
+    assert [song.key for song in wanted_songs(folder.sources(), [text], folder)] == ["beat"]
 
 
 def test_a_song_that_is_not_there_is_an_error_that_names_the_nearest(folder):
     with pytest.raises(StudioError, match=r"beet: want a song of this studio, .* near are beat"):
-        wanted_songs(freshness(folder), ["beet"], folder)
+        wanted_songs(folder.sources(), ["beet"], folder)
 
 
 def test_the_brief_names_the_method_else_it_is_the_usual_one(fresh_studio):
