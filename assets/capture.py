@@ -1,6 +1,6 @@
 """From the files under ``clips/`` to clips, skeletons and poses: parsed or calibrated, and examined."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import dagster as dg
@@ -11,12 +11,14 @@ from assets.formats import bvh
 from assets.formats.errors import FormatError
 from assets.partitions import SESSION, lake_key
 from assets.plots import calibration as calibration_plots
+from assets.plots.spikes import loud, spikes
 from assets.sources.calibration import CalibrationError, Solvers, calibrate_file, up_axis
 from assets.sources.sources import ClipFile, Studio, session_version
 from assets.stamps import ClipStamp, Earlier, Part, Parts, Progress, content_version, version_of
 from assets.tables import pack
 from assets.tables.calibration import from_calibration
-from assets.tables.motion import from_clip_fault, from_pose, from_skeleton
+from assets.tables.motion import from_clip_fault, from_pose, from_skeleton, to_fence, to_pose, to_skeleton
+from kernels.health.bridging import bridge
 from kernels.health.examine import examine
 from kernels.health.verdicts import ExaminedClip, within
 from kernels.skeleton.naming import JointMapping, map_joints
@@ -34,6 +36,7 @@ from schemas.motion import CLIP, CLIP_FAULT, POSE, SKELETON
     settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,
+    checks={"whole": (CLIP_FAULT, "No clip is broken: nothing had to be mended, fenced, doubted or refused.")},
 )
 def capture(
     context: dg.AssetExecutionContext,
@@ -41,7 +44,7 @@ def capture(
     solvers: dg.ResourceParam[Solvers],
     earlier: dg.ResourceParam[Earlier],
     progress: dg.ResourceParam[Progress],
-) -> Iterator[dg.Output[Parts]]:
+) -> Iterator[dg.Output[Parts] | dg.AssetCheckResult]:
     """Read every file of a session, or refuse it with a reason; unchanged files are carried over."""
     sessions = studio.sources().sessions()
     keys = [lake_key(key) for key in context.partition_keys]
@@ -59,6 +62,7 @@ def capture(
     yield dg.Output(Parts(poses()), POSE.name)
     for name, parts in small.items():
         yield dg.Output(Parts(parts), name)
+    yield _is_whole(small[CLIP_FAULT.name])
 
 
 _UNREAD = "cannot be read"
@@ -129,7 +133,7 @@ class _Reader:
                 pack.concat(table, _filled(made[table.name])),
                 version,
                 _stamps(stamps, made[table.name]),
-                counts if table is POSE else {},
+                counts if table is POSE else _shown(found) if table is CLIP_FAULT else {},
             )
             for table in (POSE, SKELETON, CLIP_FAULT)
         }
@@ -188,7 +192,7 @@ class _Reader:
             return _nothing(_sentence(error))
         examined = _examined(take.clip, mapping, source)
         if examined.refusal:
-            return _nothing(examined.refusal, from_clip_fault(source.key, examined.faults, take.clip.frame_rate_hz))
+            return _nothing(examined.refusal, from_clip_fault(source.key, examined.faults, take.clip))
         row = _read(
             examined,
             metres_per_unit=take.world.metres_per_unit,
@@ -201,7 +205,7 @@ class _Reader:
             from_skeleton(source.key, examined.clip.skeleton, mapping),
             from_pose(source.key, examined.clip, examined.is_fenced),
             CALIBRATION.empty(),
-            from_clip_fault(source.key, examined.faults, examined.clip.frame_rate_hz),
+            from_clip_fault(source.key, examined.faults, take.clip),
         )
 
     def _calibrate(self, source: ClipFile) -> _Reading:
@@ -218,7 +222,7 @@ class _Reader:
             return _nothing(_sentence(error))
         examined = _examined(found.clip, mapping, source)
         if examined.refusal:
-            return _nothing(examined.refusal, from_clip_fault(source.key, examined.faults, found.clip.frame_rate_hz))
+            return _nothing(examined.refusal, from_clip_fault(source.key, examined.faults, found.clip))
         row = _read(
             examined,
             metres_per_unit=found.suit.metres_per_unit,
@@ -232,8 +236,37 @@ class _Reader:
             from_skeleton(source.key, examined.clip.skeleton, mapping),
             from_pose(source.key, examined.clip, examined.is_fenced),
             from_calibration(source.key, found),
-            from_clip_fault(source.key, examined.faults, examined.clip.frame_rate_hz),
+            from_clip_fault(source.key, examined.faults, found.clip),
         )
+
+
+def _shown(found: Mapping[str, _Reading]) -> dict[str, object]:
+    """Show a session's faults, beside the motion as it is danced."""
+    faults = pack.concat(CLIP_FAULT, _filled({key: reading.fault for key, reading in found.items()}))
+    danced = {}
+    for key in {str(row["clip_id"]) for row in loud(faults)}:
+        if found[key].pose.num_rows:
+            rig, _ = to_skeleton(found[key].skeleton)
+            danced[key] = bridge(to_pose(found[key].pose, rig), to_fence(found[key].pose))
+    return {"faults": dg.MetadataValue.md(spikes(faults, danced))}
+
+
+def _is_whole(parts: Sequence[Part]) -> dg.AssetCheckResult:
+    """Check that nothing is broken, session by session; who looks here sees which is."""
+    broken = {part.key: [f"{row['clip_id']}: {row['reason']}" for row in loud(part.table)] for part in parts}
+    return dg.AssetCheckResult(
+        check_name="whole",
+        asset_key=CLIP_FAULT.name,
+        passed=not any(broken.values()),
+        severity=dg.AssetCheckSeverity.WARN,
+        metadata={
+            **{key or "clips": dg.MetadataValue.md(_listed(lines)) for key, lines in broken.items() if lines},
+            "broken_sessions": sum(map(bool, broken.values())),
+            "pictures": dg.MetadataValue.md(
+                "\n\n".join(str(part.metadata["faults"].value) for part in parts if broken[part.key]) or "none"
+            ),
+        },
+    )
 
 
 def _examined(clip: Clip, mapping: JointMapping, source: ClipFile) -> ExaminedClip:

@@ -25,6 +25,7 @@ PLACES = {
     "pose": (1, 1),
     "skeleton": (1, 2),
     "calibration": (1, 3),
+    "clip_fault": (1, -1),
     "canonical_pose": (2, 1.5),
     "motion_beat": (2, 0.3),
     "motion_graph_node": (3, 0.3),

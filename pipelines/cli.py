@@ -4,19 +4,17 @@ Each command prints a short report, or with ``--json`` exactly one object on sta
 standard error. Exit status: 0 done, 1 done but some inputs were refused, 2 nothing done.
 """
 
-import io
-import json
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
 from pipelines.caches import settle
+from pipelines.printing import NOTHING_DONE, Trouble, answer, finish, has_answered, say, settle_streams
 
 # Nothing else of ours is imported here: --help answers at once, and main sets the environment before NumPy is loaded.
 app = typer.Typer(
@@ -26,18 +24,12 @@ app = typer.Typer(
     help="Keep a motion-capture catalogue analysed and ready to dance; make a song a dance in USD.",
     pretty_exceptions_enable=False,
 )
-DONE, SOME_REFUSED, NOTHING_DONE = 0, 1, 2
-"""Exit statuses, by convention: 0 is well."""
 
 
 def _examples(*lines: str) -> str:
     """Write examples one a line; the sign in front keeps the parser from running them together."""
     return "\b\nExamples:\n" + "\n".join(f"  {line}" for line in lines)
 
-
-TROUBLE = Console(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
-_answered: list[bool] = []
-"""Whether standard output has had its one object."""
 
 StudioOption = Annotated[
     Path | None,
@@ -69,9 +61,9 @@ def demo(
     """Make up a studio and dance its song; needs no input."""
     from pipelines.commands import demo_studio
 
-    with _Trouble(as_json):
+    with Trouble(as_json):
         demo_studio.make(studio)
-        _say(f"a made-up studio is in {studio}", as_json)
+        say(f"a made-up studio is in {studio}", as_json)
     _dance(studio, [demo_studio.SONG], "graph", None, None, as_json)
 
 
@@ -87,9 +79,9 @@ def build(
     """
     from pipelines.commands.build_studio import build_studio
 
-    with _Trouble(as_json):
+    with Trouble(as_json):
         result = build_studio(_folder(studio), dances=dances, progress=_progress())
-        _finish(result, as_json)
+        finish(result, as_json)
 
 
 @app.command(
@@ -193,11 +185,11 @@ def _propose(studio: Path | None, songs: list[str], place: str, pins: Sequence[s
     from pipelines.commands.propose import propose_pins
     from pipelines.studio.files import StudioError
 
-    with _Trouble(as_json):
+    with Trouble(as_json):
         if len(songs) != 1:
             raise StudioError(f"--propose: want one song, got {len(songs)}; ask for each alone")
         result = propose_pins(_folder(studio), songs[0], place, pins=pins, progress=_progress())
-        _finish(result, as_json)
+        finish(result, as_json)
 
 
 def _dance(
@@ -211,11 +203,11 @@ def _dance(
 ) -> None:
     from pipelines.commands.dance_songs import dance_songs
 
-    with _Trouble(as_json):
+    with Trouble(as_json):
         result = dance_songs(
             _folder(studio), songs, method=method, frame_rate_hz=fps, out=out, progress=_progress(), **more
         )
-        _finish(result, as_json)
+        finish(result, as_json)
 
 
 @app.command(
@@ -239,8 +231,8 @@ def why(
     """
     from pipelines.commands.why import explain_dance
 
-    with _Trouble(as_json):
-        _finish(explain_dance(_folder(studio), danced, at_s=at), as_json)
+    with Trouble(as_json):
+        finish(explain_dance(_folder(studio), danced, at_s=at), as_json)
 
 
 @app.command(epilog=_examples("odori check dances/waltz/graph.usdz"))
@@ -254,8 +246,8 @@ def check(
     """
     from pipelines.commands.check import check_stage
 
-    with _Trouble(as_json):
-        _finish(check_stage(file), as_json)
+    with Trouble(as_json):
+        finish(check_stage(file), as_json)
 
 
 @app.command(
@@ -295,7 +287,7 @@ def search(
     as_json: JsonOption = False,
 ) -> None:
     """Find the clips most like a motion."""
-    with _Trouble(as_json):
+    with Trouble(as_json):
         from pipelines.commands import search_motions
 
         wish = search_motions.MotionQuery(
@@ -311,7 +303,7 @@ def search(
         )
         # The bar is made where something has to be: loading it loads Dagster.
         result = search_motions.search(_folder(studio), wish, sheet=sheet, train=train, progress=lambda: _progress()())
-        _finish(result, as_json)
+        finish(result, as_json)
 
 
 @app.command(
@@ -357,9 +349,9 @@ def clips(
     """
     from pipelines.commands.list_clips import ClipFilter, list_clips
 
-    with _Trouble(as_json):
+    with Trouble(as_json):
         wanted = ClipFilter(label or (), style or (), state or (), method, not_method)
-        _finish(list_clips(_folder(studio), song, wanted), as_json)
+        finish(list_clips(_folder(studio), song, wanted), as_json)
 
 
 @app.command(epilog=_examples("odori calibrate take.parquet", "odori calibrate take.csv --bvh take.bvh"))
@@ -392,7 +384,7 @@ def calibrate(
 
     The report says how sure each bone length is, and what to record again. No studio is needed.
     """
-    with _Trouble(as_json):
+    with Trouble(as_json):
         from pipelines.commands import calibrate_recording
 
         result = calibrate_recording.calibrate(
@@ -403,7 +395,7 @@ def calibrate(
             method=method,
             iterations=iterations,
         )
-        _finish(result, as_json)
+        finish(result, as_json)
 
 
 @app.command(epilog=_examples("odori status", "odori status --json", "odori status --devices"))
@@ -420,8 +412,8 @@ def status(
     """Say what is fresh, stale, failed or refused, and why."""
     from pipelines.commands.status import studio_status
 
-    with _Trouble(as_json):
-        _finish(studio_status(_folder(studio), devices=devices), as_json)
+    with Trouble(as_json):
+        finish(studio_status(_folder(studio), devices=devices), as_json)
 
 
 @app.command(epilog=_examples("odori ui", "odori ui --port 3001"))
@@ -436,64 +428,12 @@ def ui(
     """
     from pipelines import web
 
-    with _Trouble(False):
+    with Trouble(False):
         raise typer.Exit(web.serve(_folder(studio), host=host, port=port))
 
 
 def _folder(studio: Path | None) -> Path:
     return studio or Path(os.environ.get("ODORI_STUDIO", "studio"))
-
-
-def _say(text: str, as_json: bool) -> None:
-    (TROUBLE if as_json else Console(highlight=False, soft_wrap=True, markup=False, emoji=False)).print(text)
-
-
-def _finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - an Outcome; typed where it is loaded
-    for line in result.troubles:
-        TROUBLE.print(line)
-    if as_json:
-        _answer(result.facts)
-    elif result.report:
-        _say(result.report, as_json)
-    raise typer.Exit(result.status)
-
-
-def _answer(facts: Mapping[str, Any]) -> None:
-    """Print the one JSON object: in UTF-8, whatever the console or the pipe would have it in."""
-    _answered.append(True)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
-    sys.stdout.write(json.dumps(facts, ensure_ascii=False, sort_keys=True) + "\n")
-
-
-def _settle_streams() -> None:
-    """Let no sign end a report: what the encoding of a console lacks is written as its number."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-
-
-class _Trouble:
-    """Turn what the user can mend into one sentence and exit status 2."""
-
-    def __init__(self, as_json: bool) -> None:
-        self._as_json = as_json
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _: object) -> None:
-        if error is None or isinstance(error, typer.Exit):
-            return
-        from assets.formats.errors import FormatError
-        from pipelines.studio.files import LakeError, StudioError
-
-        if isinstance(error, StudioError | LakeError | FormatError | LookupError | OSError):
-            text = error.args[0] if isinstance(error, LookupError) and error.args else str(error)
-            TROUBLE.print(f"odori: {text}")
-            if self._as_json:
-                _answer({"error": str(text)})
-            raise typer.Exit(NOTHING_DONE) from error
 
 
 def _progress() -> Callable[[], Any]:
@@ -509,12 +449,14 @@ def main() -> None:
     for library in ("OPENBLAS", "OMP", "MKL"):  # more threads change last bits: same inputs, same bytes
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     settle()
-    _settle_streams()
+    settle_streams()
     try:
         app()
     except SystemExit as ended:
-        if ended.code == NOTHING_DONE and "--json" in sys.argv and not _answered:  # a usage error, said by the parser
-            _answer({"error": "the command line is wrong; standard error says how"})
+        if (
+            ended.code == NOTHING_DONE and "--json" in sys.argv and not has_answered()
+        ):  # a usage error, said by the parser
+            answer({"error": "the command line is wrong; standard error says how"})
         raise
 
 

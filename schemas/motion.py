@@ -43,6 +43,9 @@ CLIP = Table(
     ),
 )
 
+QUIET_FAULT_KINDS = ("fast", "trimmed")
+"""Kinds of fault nobody has to look at: motion that is real, and what the studio cut off itself."""
+
 VERDICTS = ("mended", "fenced", "doubtful", "refused")
 
 CLIP_FAULT = Table(
@@ -64,6 +67,12 @@ CLIP_FAULT = Table(
             values=VERDICTS,
         ),
         f.REASON_OF_FAULT,
+        Column("turn_start_s", pa.float64(), "Time of the first value of `turn_rad_per_s` in the clip."),
+        Column(
+            "turn_rad_per_s",
+            pa.list_(pa.float32()),
+            "How fast the joint turned around it, as recorded, a value a frame; of the whole body its fastest joint.",
+        ),
     ),
 )
 

@@ -17,6 +17,7 @@ from assets.tables.pack import (
     vector,
     vectors,
 )
+from kernels.health.evidence import around
 from kernels.health.verdicts import ClipFault
 from kernels.motion.motion_beats import MotionBeats
 from kernels.skeleton.canonical import JOINTS
@@ -59,18 +60,21 @@ def to_skeleton(rows: pa.Table) -> tuple[Skeleton, JointMapping]:
     return skeleton, JointMapping({name: driven[name] for name in JOINTS if name in driven}, "stored")
 
 
-def from_clip_fault(clip_id: str, faults: Sequence[ClipFault], frame_rate_hz: float) -> pa.Table:
-    """Pack the faults of a clip, a row each, none where nothing is wrong."""
-    n = len(faults)
+def from_clip_fault(clip_id: str, faults: Sequence[ClipFault], recorded: Clip) -> pa.Table:
+    """Pack the faults of a clip, a row each, none where nothing is wrong; with how fast it turned as recorded."""
+    n, rate_hz = len(faults), recorded.frame_rate_hz
+    shown = [around(fault, recorded) for fault in faults]
     columns = [
         pa.array([clip_id] * n, pa.string()),
         pa.array(np.arange(n), pa.int32()),
         pa.array([fault.kind for fault in faults], pa.string()),
         pa.array([fault.joint for fault in faults], pa.string()),
-        pa.array([fault.first / frame_rate_hz for fault in faults], pa.float64()),
-        pa.array([fault.last / frame_rate_hz for fault in faults], pa.float64()),
+        pa.array([fault.first / rate_hz for fault in faults], pa.float64()),
+        pa.array([fault.last / rate_hz for fault in faults], pa.float64()),
         pa.array([fault.verdict for fault in faults], pa.string()),
         pa.array([fault.reason for fault in faults], pa.string()),
+        pa.array([first / rate_hz for first, _ in shown], pa.float64()),
+        pa.array([turn.astype(np.float32).tolist() for _, turn in shown], pa.list_(pa.float32())),
     ]
     return CLIP_FAULT.check(pa.table(columns, schema=CLIP_FAULT.arrow))
 

@@ -137,23 +137,36 @@ def _report(shown: Sequence[Mapping[str, Any]], n_clips: int, song: DancedSong |
     able = {name: sum(clip["danceable"][name] for clip in shown) for name in METHODS}
     counted = ", ".join(f"{n} by {name}" for name, n in able.items())
     lines = [f"{len(shown)} of {n_clips} clips; danceable{f' to {song.song_id}' if song else ''}: {counted}"]
+    common = _common(shown)
+    lines += [f"  not by {name}, none of them: {sentence}" for name, sentence in common.items()]
     for clip in shown[:LONGEST_LIST]:
         ways = ", ".join(name for name, is_able in clip["danceable"].items() if is_able) or "by none"
         kind = " / ".join(text for text in (clip["label"], clip["style"]) if text)
         lines.append(f"  {clip['clip_id']}  {kind}  {clip['state']}  {ways}")
-        lines += [f"      {line}" for line in _said(clip)]
+        lines += [f"      {line}" for line in _said(clip, common)]
     if len(shown) > LONGEST_LIST:
         lines.append(f"  … and {len(shown) - LONGEST_LIST} more; --json has all, --label, --style and --state fewer")
     return "\n".join(lines)
 
 
-def _said(clip: Mapping[str, Any]) -> list[str]:
+def _common(shown: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Find the methods that can dance no clip of several, for one reason."""
+    found = {}
+    for name in METHODS:
+        reasons = {clip["why_not"].get(name, "") for clip in shown}
+        if len(shown) > 1 and len(reasons) == 1 and "" not in reasons:
+            found[name] = reasons.pop()
+    return found
+
+
+def _said(clip: Mapping[str, Any], common: Mapping[str, str]) -> list[str]:
     """Say why a clip is not danced, one line for methods of one reason; and what is wrong with it, in short."""
     if clip["state"] == "refused":
         return [f"refused: {clip['reason']}"]
     by_reason: dict[str, list[str]] = {}
     for name, sentence in clip["why_not"].items():
-        by_reason.setdefault(sentence, []).append(name)
+        if name not in common:
+            by_reason.setdefault(sentence, []).append(name)
     lines = [f"not by {', '.join(names)}: {sentence}" for sentence, names in by_reason.items()]
     counted = Counter((fault["verdict"], fault["fault_kind"]) for fault in clip["faults"])
     for (verdict, kind), n in counted.items():

@@ -7,7 +7,7 @@ from assets.sources.sources import Sources
 from assets.stamps import content_version
 from assets.tables.pack import by_clip
 from pipelines.studio.lake import Lake
-from schemas.motion import CANONICAL_POSE, CLIP_FAULT
+from schemas.motion import CANONICAL_POSE, CLIP_FAULT, QUIET_FAULT_KINDS
 from schemas.music import SONG
 
 _NO_POSE = content_version(CANONICAL_POSE.empty())
@@ -49,10 +49,6 @@ def clips_and_doubts(
     return found, doubts
 
 
-QUIET_KINDS = ("fast", "trimmed")
-"""Kinds of fault nobody has to look at: motion that is real, and what the studio cut off itself."""
-
-
 def _troubles(lake: Lake) -> dict[str, list[str]]:
     """Say what was mended, fenced or doubted of each clip, a sentence for each kind."""
     found: dict[str, list[str]] = {}
@@ -62,7 +58,7 @@ def _troubles(lake: Lake) -> dict[str, list[str]]:
         for clip, rows in by_clip(lake.table(CLIP_FAULT.name, session)).items():
             alike: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
             for row in rows.to_pylist():
-                if row["fault_kind"] not in QUIET_KINDS and row["verdict"] != "refused":
+                if row["fault_kind"] not in QUIET_FAULT_KINDS and row["verdict"] != "refused":
                     alike.setdefault((row["verdict"], row["fault_kind"]), []).append(row)
             found[clip] = [_trouble(verdict, same) for (verdict, _), same in alike.items()]
     return found

@@ -57,8 +57,8 @@ class InMemory:
 def test_a_clip_whose_rhythm_is_none_is_left_out(value):
     values, contact = np.ones(3), np.zeros((3, 2), bool)
     one = MotionFeatures(values, values, values, values)
-    rows = mt.from_motion_feature("day-a", replace(one, rhythm=np.array([1.0, value, 1.0])), contact)
+    rows = mt.from_motion_feature("day-a", replace(one, rhythm=np.array([1.0, value, 1.0])), contact, contact[:, 0])
     rhythms, left_out = catalogue(InMemory(rows))
     assert (rhythms, left_out) == ({}, ["day-a: its rhythm is not finite"])
-    good = mt.from_motion_feature("day-b", one, contact)
+    good = mt.from_motion_feature("day-b", one, contact, contact[:, 0])
     assert catalogue(InMemory(good))[0]["day-b"].tolist() == [1, 1, 1]

@@ -1,6 +1,5 @@
 """What the command prints on consoles of any encoding, and its version."""
 
-import io
 import json
 import os
 import subprocess
@@ -10,8 +9,6 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-
-from pipelines import cli
 
 REPOSITORY = Path(__file__).parents[2]
 # What pipes of Windows are in Western Europe, and a C locale that stays one: there Python reads no file's name either.
@@ -69,28 +66,6 @@ def test_no_sign_ends_a_page_of_help(console):
     done = odori(console, "dance", "--help")
     assert done.returncode == 0
     assert b"Traceback" not in done.stderr
-
-
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "cp932", "utf-16", "utf-8"])
-def test_every_encoding_of_a_pipe(encoding, monkeypatch):
-    """An answer, a report and a complaint, with signs of three bytes, of four, and none of any encoding."""
-    text = "歌 Été 🕺 \udce9"
-    streams = {name: io.TextIOWrapper(io.BytesIO(), encoding=encoding) for name in ("stdout", "stderr")}
-    for name, stream in streams.items():
-        monkeypatch.setattr(sys, name, stream)
-    monkeypatch.setattr(cli, "_answered", [])
-    cli._settle_streams()
-    cli.TROUBLE.print(text)
-    cli._say(text, False)
-    streams["stdout"].flush()
-    said = streams["stdout"].buffer.getvalue()
-    cli._answer({"path": text})
-    for stream in streams.values():
-        stream.flush()
-    assert r"\udce9" in streams["stderr"].buffer.getvalue().decode(encoding)
-    assert ("歌" in said.decode(encoding)) == (encoding in ("cp932", "utf-16", "utf-8"))
-    answer = streams["stdout"].buffer.getvalue()[len(said) :]
-    assert json.loads(answer.decode("utf-8")) == {"path": text}
 
 
 @pytest.mark.parametrize("console", [KEPT, "cp1252"])

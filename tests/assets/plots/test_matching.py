@@ -25,7 +25,7 @@ def stored():
 def test_features_of_a_session_with_a_row_a_clip():
     values = np.abs(np.sin(np.arange(200) / 9))
     contact = np.ones((200, 2), bool)
-    table = mt.from_motion_feature("s-a", MotionFeatures(values, values, values, values), contact)
+    table = mt.from_motion_feature("s-a", MotionFeatures(values, values, values, values), contact, contact[:, 0])
     text = mp.session_features(table)
     assert "| s-a | 1.67 |" in text
     assert "data:image/png" in text

@@ -24,6 +24,8 @@ def test_session_shows_every_clip_refused_ones_with_their_reason():
         "duration_s": 8.0,
         "joint_count": 22,
         "is_labelled": False,
+        "health": "",
+        "danceability_ratio": 1.0,
         "performed_offset_s": 0.0,
         "metres_per_unit": 1.0,
         "reason": None,

@@ -86,6 +86,8 @@ def test_rows_of_clips_that_were_read():
         "duration_s": 1.0,
         "joint_count": 22,
         "is_labelled": False,
+        "health": "",
+        "danceability_ratio": 1.0,
         "performed_offset_s": 0.0,
         "metres_per_unit": 1.0,
         "reason": None,

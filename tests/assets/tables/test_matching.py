@@ -26,7 +26,7 @@ def a_match(segment, rank, clip, *, scale=5, score=1.0):
 def test_a_clip_comes_back_in_float32_under_its_name():
     values = np.linspace(0, 1, 5)
     contact = np.array([[True, False]] * 5)
-    table = mt.from_motion_feature("s-a", MotionFeatures(values, values, values, values), contact)
+    table = mt.from_motion_feature("s-a", MotionFeatures(values, values, values, values), contact, contact[:, 0])
     assert table.schema.equals(MOTION_FEATURE.arrow)
     assert table["is_left_contact"].to_pylist() == [True] * 5
     assert table["is_right_contact"].to_pylist() == [False] * 5

@@ -23,6 +23,7 @@ def clip_rows(**state):
     texts = dict.fromkeys(names.split(" "), "x")
     plain = {"frame_rate_hz": 30.0, "frame_count": 31, "duration_s": 1.0, "joint_count": 22, "metres_per_unit": 1.0}
     more = {"session": "s", "is_labelled": True, "reason": None, "source_format": "bvh", "warnings": []}
+    more |= {"health": "", "danceability_ratio": 1.0}
     return from_rows(
         CLIP,
         [{**texts, **plain, **more, "performed_offset_s": 0.0, "clip_id": c, "state": s} for c, s in state.items()],
