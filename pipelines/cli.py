@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from pipelines.caches import settle
-from pipelines.printing import NOTHING_DONE, Trouble, answer, finish, has_answered, say, settle_streams
+from pipelines.printing import NOTHING_DONE, Complaint, answer, finish, has_answered, say, settle_streams
 
 # Nothing else of ours is imported here: --help answers at once, and main sets the environment before NumPy is loaded.
 app = typer.Typer(
@@ -61,7 +61,7 @@ def demo(
     """Make up a studio and dance its song; needs no input."""
     from pipelines.commands import demo_studio
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         demo_studio.make(studio)
         say(f"a made-up studio is in {studio}", as_json)
     _dance(studio, [demo_studio.SONG], "graph", None, None, as_json)
@@ -79,7 +79,7 @@ def build(
     """
     from pipelines.commands.build_studio import build_studio
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         result = build_studio(_folder(studio), dances=dances, progress=_progress())
         finish(result, as_json)
 
@@ -185,7 +185,7 @@ def _propose(studio: Path | None, songs: list[str], place: str, pins: Sequence[s
     from pipelines.commands.propose import propose_pins
     from pipelines.studio.files import StudioError
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         if len(songs) != 1:
             raise StudioError(f"--propose: want one song, got {len(songs)}; ask for each alone")
         result = propose_pins(_folder(studio), songs[0], place, pins=pins, progress=_progress())
@@ -203,7 +203,7 @@ def _dance(
 ) -> None:
     from pipelines.commands.dance_songs import dance_songs
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         result = dance_songs(
             _folder(studio), songs, method=method, frame_rate_hz=fps, out=out, progress=_progress(), **more
         )
@@ -231,7 +231,7 @@ def why(
     """
     from pipelines.commands.why import explain_dance
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         finish(explain_dance(_folder(studio), danced, at_s=at), as_json)
 
 
@@ -246,7 +246,7 @@ def check(
     """
     from pipelines.commands.check import check_stage
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         finish(check_stage(file), as_json)
 
 
@@ -287,7 +287,7 @@ def search(
     as_json: JsonOption = False,
 ) -> None:
     """Find the clips most like a motion."""
-    with Trouble(as_json):
+    with Complaint(as_json):
         from pipelines.commands import search_motions
 
         wish = search_motions.MotionQuery(
@@ -349,7 +349,7 @@ def clips(
     """
     from pipelines.commands.list_clips import ClipFilter, list_clips
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         wanted = ClipFilter(label or (), style or (), state or (), method, not_method)
         finish(list_clips(_folder(studio), song, wanted), as_json)
 
@@ -384,7 +384,7 @@ def calibrate(
 
     The report says how sure each bone length is, and what to record again. No studio is needed.
     """
-    with Trouble(as_json):
+    with Complaint(as_json):
         from pipelines.commands import calibrate_recording
 
         result = calibrate_recording.calibrate(
@@ -412,7 +412,7 @@ def status(
     """Say what is fresh, stale, failed or refused, and why."""
     from pipelines.commands.status import studio_status
 
-    with Trouble(as_json):
+    with Complaint(as_json):
         finish(studio_status(_folder(studio), devices=devices), as_json)
 
 
@@ -428,7 +428,7 @@ def ui(
     """
     from pipelines import web
 
-    with Trouble(False):
+    with Complaint(False):
         raise typer.Exit(web.serve(_folder(studio), host=host, port=port))
 
 

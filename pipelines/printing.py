@@ -23,12 +23,29 @@ def has_answered() -> bool:
 
 
 def say(text: str, as_json: bool) -> None:
-    """Print for a person: on standard error where a machine reads standard output."""
+    """Print for a person: on standard error where a machine reads standard output.
+
+    Parameters
+    ----------
+    text : the report, or a line of it
+    as_json : whether a machine reads standard output
+    """
     (TROUBLE if as_json else Console(highlight=False, soft_wrap=True, markup=False, emoji=False)).print(text)
 
 
 def finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - an Outcome; typed where it is loaded
-    """Print what a command came to, and end with its exit status."""
+    """Print what a command came to, and end with its exit status.
+
+    Parameters
+    ----------
+    result : pipelines.commands.outcome.Outcome
+    as_json : whether a machine reads standard output
+
+    Raises
+    ------
+    typer.Exit
+        Always.
+    """
     for line in result.troubles:
         TROUBLE.print(line)
     if as_json:
@@ -39,7 +56,12 @@ def finish(result: Any, as_json: bool) -> None:  # noqa: ANN401 - an Outcome; ty
 
 
 def answer(facts: Mapping[str, Any]) -> None:
-    """Print the one JSON object: in UTF-8, whatever the console or the pipe would have it in."""
+    """Print the one JSON object: in UTF-8, whatever the console or the pipe would have it in.
+
+    Parameters
+    ----------
+    facts : what JSON can hold
+    """
     _answered.append(True)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(encoding="utf-8", errors="backslashreplace", newline="\n")
@@ -53,8 +75,13 @@ def settle_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-class Trouble:
-    """Turn what the user can mend into one sentence and exit status 2."""
+class Complaint:
+    """Turn what the user can mend into one sentence and exit status 2.
+
+    Parameters
+    ----------
+    as_json : whether a machine reads standard output
+    """
 
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json

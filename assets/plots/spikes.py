@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from assets.plots.draw import COOL, SOFT, WARM, figure_of, markdown, picture, plain, png
 from assets.tables.pack import by_clip
-from kernels.health.evidence import turn_rad_per_s
+from kernels.health.turns import turn_rad_per_s
 from kernels.types import Clip
 from schemas.motion import QUIET_FAULT_KINDS
 

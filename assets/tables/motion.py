@@ -17,7 +17,7 @@ from assets.tables.pack import (
     vector,
     vectors,
 )
-from kernels.health.evidence import around
+from kernels.health.turns import around
 from kernels.health.verdicts import ClipFault
 from kernels.motion.motion_beats import MotionBeats
 from kernels.skeleton.canonical import JOINTS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kernels import rotation
-from kernels.health.evidence import around, turn_rad_per_s
+from kernels.health.turns import around, turn_rad_per_s
 from kernels.health.verdicts import ClipFault
 from kernels.synthetic import dancer
 
