@@ -51,6 +51,7 @@ docs: $(STAMP) ## docs/data.md, docs/settings.md and the pictures of docs, from 
 	@$(BIN)/python docs/generate.py
 	@$(BIN)/python docs/draw_graph.py
 	@$(BIN)/python docs/draw_springs.py
+	@$(BIN)/python docs/draw_spikes.py
 
 $(BLENDER)/.installed: requirements-blender.lock $(STAMP)
 	@$(BIN)/python -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
