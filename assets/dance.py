@@ -1,6 +1,6 @@
 """From a choreography to a finished dance: poses, lineage, quality."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import dagster as dg
@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from assets.dancing.assembled import assemble_steps
+from assets.dancing.shown_moments import flip_sentences, move_sentence
 from assets.declare import table_asset, table_assets
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.plots.dance import contact_sheet, dance_timeline, measure_table
@@ -24,11 +25,12 @@ from assets.tables.choreography import (
     to_dance,
 )
 from assets.tables.music import to_music_beat
-from kernels.assembly import foot_quality, quality, seam_quality
+from kernels.assembly import foot_quality, one_frame_flips, quality, seam_quality
+from kernels.assembly.blend import Dance
 from kernels.assembly.quality import Measure
 from kernels.assembly.timing import cover
 from kernels.skeleton.canonical import CANONICAL
-from kernels.types import Choreography
+from kernels.types import Choreography, Clip
 from schemas.choreography import DANCE_POSE, DANCE_QUALITY, FRAME_LINEAGE
 from schemas.keys import source_clip
 
@@ -39,7 +41,7 @@ _EVERY_CLIP = dg.AssetIn(partition_mapping=EVERY)
     "assembly",
     (DANCE_POSE, FRAME_LINEAGE),
     group="dance",
-    code_version="3",
+    code_version="4",
     settings="dance",
     sources="request",
     partitions=DANCE,
@@ -71,10 +73,11 @@ def assembly(
 @table_asset(
     DANCE_QUALITY,
     group="dance",
-    code_version="4",
+    code_version="5",
     partitions=DANCE,
     ins={"canonical_pose": _EVERY_CLIP, "clip": _EVERY_CLIP},
     checks={
+        "flips": "No joint flips from one frame to the next, and none moves further than in the clips.",
         "beats": "Beats on time, and better than chance to an independent observer.",
         "warp": "Clips near their own pace.",
         "seams": "Seams no rougher than the clips themselves.",
@@ -102,6 +105,7 @@ def dance_quality(
     strength = matching_tables.strength_between(music_feature, grid_s)
     clips = load_clips(canonical_pose, steps)
     found = {
+        "flips": _flips(dance, steps, clips),
         "beats": [*quality.lag_measures(dance, steps, beat_s), *quality.beat_measures(dance, beat_s)],
         "warp": quality.warp_measures(steps),
         "seams": seam_quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
@@ -124,13 +128,24 @@ def dance_quality(
             yield _check(name, measures)
 
 
+def _flips(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
+    """Measure what no body does in a frame; what is not as wanted says when, and of which clip."""
+    flips = one_frame_flips.find_flips(dance.rotation_wxyz, CANONICAL.parent, dance.frame_rate_hz)
+    furthest = one_frame_flips.furthest_move(dance, steps, clips, skeleton=CANONICAL)
+    counted, moved = one_frame_flips.flip_measure(flips), one_frame_flips.move_measure(furthest)
+    told = () if moved.is_passed or furthest is None else (move_sentence(furthest, dance, steps),)
+    return [replace(counted, reasons=flip_sentences(flips, dance, steps)), replace(moved, reasons=told)]
+
+
 def _check(name: str, measures: list[Measure]) -> dg.AssetCheckResult:
+    told = [reason for m in measures for reason in m.reasons]
     return dg.AssetCheckResult(
         check_name=name,
         asset_key=DANCE_QUALITY.name,
         passed=all(m.is_passed is not False for m in measures),
         severity=dg.AssetCheckSeverity.WARN,
-        metadata={m.name: float(m.value) for m in measures if np.isfinite(m.value)},
+        metadata={m.name: float(m.value) for m in measures if np.isfinite(m.value)}
+        | ({"not_as_wanted": dg.MetadataValue.json(told)} if told else {}),
     )
 
 

@@ -55,7 +55,7 @@ class Stage:
 @table_asset(
     USD_ANIMATION,
     group="dance",
-    code_version="4",
+    code_version="5",
     sources="character",
     partitions=DANCE,
     ins={name: _EVERY_CLIP for name in ("clip", "skeleton", "pose")},
@@ -169,7 +169,7 @@ def outside_warp(steps: Choreography) -> list[dict[str, Any]]:
 
 def _quality(table: pa.Table) -> dict[str, Any]:
     return {
-        row["metric_name"]: {"value": row["value"], "wanted": row["wanted"], "is_passed": row["is_passed"]}
+        row["metric_name"]: {name: row[name] for name in ("value", "wanted", "is_passed", "reasons")}
         for row in table.to_pylist()
     }
 

@@ -120,7 +120,7 @@ def whole(seed: int, n_motions: int) -> dict[str, float]:
             "dance_path_accuracy_ratio": float(np.mean(hits)),
             "dance_music_p_probability": float(evidence["chance_probability"]),
             "dance_wall_s": took_s,
-            "dance_not_as_wanted_count": float(len(outcome.facts["not_as_wanted"])),
+            "dance_not_as_wanted_count": float(len(outcome.facts["missed"])),
         }
 
 
@@ -195,12 +195,12 @@ def real_drums(every: int) -> tuple[dict[str, float], list[str]]:
             shutil.copyfile(file, root / "songs" / f"{file.parent.name}_{file.name}")
         outcome = dance(root, [f"{file.parent.name}_{file.name}" for file in files])
         made = outcome.facts["dances"] if len(files) > 1 else [outcome.facts]
-        lines = [f"{d['song']}: {', '.join(d['not_as_wanted'])}" for d in made if d["not_as_wanted"]]
+        lines = [f"{d['song']}: {', '.join(d['missed'])}" for d in made if d["missed"]]
         lines += list(outcome.troubles)
         figures = {
             "real_songs": float(len(files)),
             "real_danced": float(len(made)),
-            "real_as_wanted": float(sum(not d["not_as_wanted"] for d in made)),
+            "real_as_wanted": float(sum(not d["missed"] for d in made)),
         }
         return figures, lines
 

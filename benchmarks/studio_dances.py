@@ -124,8 +124,8 @@ def built(root: Path | None) -> Iterator[Path]:
 
 def _gather(source: Path, target: Path) -> None:
     target.mkdir(exist_ok=True)
-    for path in sorted(source.iterdir()):
-        if path.suffix.lower() in (".bvh", ".csv", ".wav", ".ogg", ".mp3", ".flac", ".mid"):
+    for path in sorted(source.rglob("*")):
+        if path.suffix.lower() in (".bvh", ".wav", ".ogg", ".mp3", ".flac", ".mid"):
             (target / path.name).symlink_to(path.resolve())
 
 

@@ -88,13 +88,22 @@ class MadeDance:
 
     @property
     def not_as_wanted(self) -> list[str]:
-        """Names of the measures that are not as wanted."""
-        return sorted(name for name, measure in self.report["wanted"].items() if measure["is_passed"] is False)
+        """Sentences on what keeps the dance from being as wanted, with time and clip; empty where nothing does."""
+        from pipelines.commands.dance_report import not_as_wanted
+
+        return not_as_wanted(self.report)
 
     @property
     def is_as_wanted(self) -> bool:
-        """Whether every measure is as wanted."""
+        """Whether every measure that decides is as wanted."""
         return not self.not_as_wanted
+
+    @property
+    def missed(self) -> list[str]:
+        """Names of the measures that miss their limits, whether they decide or not."""
+        from pipelines.commands.dance_report import missed
+
+        return missed(self.report)
 
     @property
     def licence(self) -> dict[str, Any]:

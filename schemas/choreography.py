@@ -88,8 +88,12 @@ DANCE_QUALITY = Table(
         Column("value", pa.float64(), "The measure; null when it cannot be taken.", is_optional=True),
         Column("wanted", pa.string(), "What is wanted, in words; empty when only reported."),
         Column("is_passed", pa.bool_(), "Whether it is as wanted; null when only reported.", is_optional=True),
+        Column("reasons", pa.list_(pa.string()), "Sentences on what is not as wanted: when, and of which clip."),
     ),
 )
+
+DECISIVE_MEASURES = ("one_frame_flip_count",)
+"""Measures that decide whether a dance is as wanted: all of them must be."""
 
 USD_ANIMATION = Table(
     name="usd_animation",

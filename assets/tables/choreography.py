@@ -141,6 +141,7 @@ def from_dance_quality(song_id: str, method: str, measures: Iterable[Measure]) -
                 "value": m.value if np.isfinite(m.value) else None,
                 "wanted": m.wanted,
                 "is_passed": m.is_passed,
+                "reasons": list(m.reasons),
             }
             for m in measures
         ],

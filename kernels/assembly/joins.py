@@ -91,7 +91,34 @@ def linear_slerp(x: Float, half_s: float, before: Side, after: Side) -> tuple[Fl
 
 def _mix(share: Float, before: Side, after: Side) -> tuple[Float, Float]:
     root = before.root_xyz_m + share[:, None] * (after.root_xyz_m - before.root_xyz_m)
-    return root, rotation.slerp(before.rotation_wxyz, after.rotation_wxyz, share[:, None])
+    return root, one_way_slerp(before.rotation_wxyz, after.rotation_wxyz, share)
+
+
+def one_way_slerp(before_wxyz: Float, after_wxyz: Float, share: Float) -> Float:
+    """Mix two moving poses, each joint going the same way round through the whole of the mix.
+
+    Two hands that differ by half a turn and a little have their shorter arc now on one side, now on the other: a joint
+    that took it frame by frame would jump. The way is chosen once for a joint: the one that is shorter where both clips
+    have a say.
+
+    Parameters
+    ----------
+    before_wxyz, after_wxyz : (n, J, 4) float, unit, of frames that follow each other
+    share : (n,) float, 0 to 1, of the second
+
+    Returns
+    -------
+    (n, J, 4) float64, unit; empty in, empty out
+    """
+    if len(share) == 0:
+        return np.zeros((0, *before_wxyz.shape[1:]))
+    turn = rotation.continuous(rotation.mul(rotation.inv(before_wxyz), after_wxyz))
+    say = share * (1 - share) + 1e-9
+    turn = np.where((say[:, None] * turn[..., 0]).sum(axis=0)[:, None] < 0, -turn, turn)
+    sine = np.linalg.norm(turn[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, turn[..., :1])  # 0 to a whole turn: beyond half of one the joint goes on as it went
+    vector = np.where(sine > 1e-12, angle / np.maximum(sine, 1e-12), 2.0) * turn[..., 1:]
+    return rotation.mul(before_wxyz, rotation.exp(share[:, None, None] * vector))
 
 
 def inertial(x: Float, half_s: float, before: Side, after: Side) -> tuple[Float, Float]:

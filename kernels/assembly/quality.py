@@ -20,12 +20,16 @@ from kernels.warp import EASY_WARP, HARD_WARP
 
 @dataclass(frozen=True)
 class Measure:
-    """One figure of a dance: its name ends in its unit; ``is_passed`` is None where it is only reported."""
+    """One figure of a dance: its name ends in its unit; ``is_passed`` is None where it is only reported.
+
+    ``reasons`` are sentences on what is not as wanted: when, and of which clip.
+    """
 
     name: str
     value: float
     wanted: str = ""
     is_passed: bool | None = None
+    reasons: tuple[str, ...] = ()
 
 
 LONGEST_BEAT_S = 20.0

@@ -25,7 +25,7 @@ from pipelines.commands import hmm_report
 from pipelines.studio.files import StudioError, write_beside
 from pipelines.studio.folder import StudioFolder
 from pipelines.studio.stored import StoredTable
-from schemas.choreography import CHOREOGRAPHY
+from schemas.choreography import CHOREOGRAPHY, DECISIVE_MEASURES
 from schemas.keys import alternative_number, base_method, mirrored, seen_label
 from schemas.pins import PinWish
 
@@ -49,7 +49,9 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
         "stage": str(folder / f"{method}.usdc"),
         "usdz": str(folder / f"{method}.usdz"),
         "quality": report["quality"],
-        "not_as_wanted": sorted(n for n, m in report["wanted"].items() if m["is_passed"] is False),
+        "as_wanted": not not_as_wanted(report),
+        "not_as_wanted": not_as_wanted(report),
+        "missed": missed(report),
         "licence": report["licence"],
         "cost": sum(costs.values()),
         "costs": costs,
@@ -63,6 +65,36 @@ def facts_of(studio: StudioFolder, song: str, method: str) -> dict[str, Any]:
     if alternative_number(method) > 1:
         facts |= _difference(studio, song, base_method(method), steps)
     return facts
+
+
+def not_as_wanted(report: Mapping[str, Any]) -> list[str]:
+    """Say what keeps a dance from being as wanted: sentences on :data:`schemas.choreography.DECISIVE_MEASURES`.
+
+    Parameters
+    ----------
+    report : of a dance, the JSON beside its stage
+
+    Returns
+    -------
+    list of sentences
+        With time and clip where a measure has them; empty for a dance that is as wanted.
+    """
+    told: list[str] = []
+    for name in DECISIVE_MEASURES:
+        measure = report["wanted"].get(name, {"is_passed": None})
+        if measure["is_passed"] is False:
+            told += measure.get("reasons") or [f"{name} is {measure['value']:g}, wanted is {measure['wanted']}"]
+    return told
+
+
+def missed(report: Mapping[str, Any]) -> list[str]:
+    """Name the measures of a dance that miss their limits, whether they decide or not.
+
+    Parameters
+    ----------
+    report : of a dance, the JSON beside its stage
+    """
+    return sorted(name for name, measure in report["wanted"].items() if measure["is_passed"] is False)
 
 
 def _difference(studio: StudioFolder, song: str, best: str, steps: pl.DataFrame) -> dict[str, Any]:
@@ -193,8 +225,9 @@ def report_of(facts: dict[str, Any]) -> str:
         f"  pin {p['pin']}: {'kept' if p['is_kept'] else 'not kept'}, {', '.join(p['clips'])} {_when(p)}"
         for p in facts["pins"]
     ]
-    if facts["not_as_wanted"]:
-        lines.append(f"  not as wanted: {', '.join(facts['not_as_wanted'])} (limits: the .json beside the stage)")
+    lines += [f"  not as wanted: {sentence}" for sentence in facts["not_as_wanted"]]
+    if facts["missed"]:
+        lines.append(f"  limits missed: {', '.join(facts['missed'])} (limits: the .json beside the stage)")
     if "model" in facts:
         lines += hmm_report.report_lines(facts["model"])
     return "\n".join(lines)

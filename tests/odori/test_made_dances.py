@@ -9,6 +9,7 @@ def test_a_finished_dance_knows_its_files_measures_steps_and_poses(shown):
     assert dance.stage.is_file()
     assert dance.usdz.is_file()
     assert dance.is_as_wanted == (dance.not_as_wanted == [])
+    assert set(dance.missed) <= set(dance.quality)
     assert set(dance.quality) > {"beat_f_ratio", "beat_p_probability"}
     assert dance.steps.height == shown.table("choreography").num_rows
     assert dance.frames.height == dance.poses.n_frames

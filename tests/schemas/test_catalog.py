@@ -22,7 +22,7 @@ PROMISED = {
     "choreography": "step_index song_start_s song_end_s clip_id clip_start_s clip_end_s has_seam blend_s warp_ratio "
     "pin_id",
     "frame_lineage": "frame_index time_s clip_id clip_time_s blend_clip_id blend_time_s blend_weight_ratio warp_ratio",
-    "dance_quality": "metric_name value wanted is_passed",
+    "dance_quality": "metric_name value wanted is_passed reasons",
 }
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from kernels import rotation
 from kernels.assembly.blend import assemble
-from kernels.assembly.joins import PROBE_S, SHAPES, Side, ease
+from kernels.assembly.joins import PROBE_S, SHAPES, Side, ease, one_way_slerp
 from kernels.motion.velocity import jerk
 from kernels.skeleton.canonical import CANONICAL
 from schemas.settings import DanceSettings
@@ -93,3 +93,37 @@ def test_an_unknown_shape_is_refused(phrases, clips):
     steps = phrases(("step", 0.25, 6, 0.5, 0.5))
     with pytest.raises(ValueError, match="want one of slerp, linear_slerp, inertial, got 'cut'"):
         assemble(steps, clips, skeleton=CANONICAL, frame_rate_hz=60.0, duration_s=3.0, shape="cut")
+
+
+def turning(start_deg, end_deg, n=13):
+    """A hand that turns evenly about its own axis, (n, 1, 4)."""
+    angle = np.radians(np.linspace(start_deg, end_deg, n))
+    return rotation.from_axis_angle(np.array([1.0, 0.0, 0.0]), angle)[:, None]
+
+
+@pytest.mark.parametrize("apart_deg", [(150, 150), (150, 210), (170, 190), (195, 165), (150, 240)])
+def test_hands_that_differ_by_half_a_turn_go_one_way_round(apart_deg):
+    """Thirteen frames at 30 a second; the shorter arc changes its side in the midst of the blend."""
+    before, after = turning(0, 0), turning(*apart_deg)
+    share = ease(np.linspace(0, 1, 13))
+    mixed = one_way_slerp(before, after, share)
+    steps = np.degrees(rotation.angle_between(mixed[:-1], mixed[1:]))
+    assert steps.max() < 45
+    np.testing.assert_allclose(rotation.angle_between(mixed[[0, -1]], np.stack([before[0], after[-1]])), 0, atol=1e-7)
+    np.testing.assert_allclose(np.linalg.norm(mixed, axis=-1), 1, atol=1e-12)
+
+
+def test_the_way_round_is_the_shorter_one_where_both_clips_have_a_say():
+    before, after = turning(0, 0), turning(190, 150)
+    share = np.full(13, 0.5)
+    mixed = one_way_slerp(before, after, share)
+    angle = np.degrees(2 * np.arctan2(mixed[:, 0, 1], mixed[:, 0, 0]))
+    np.testing.assert_allclose(angle, np.linspace(95, 75, 13), atol=1e-9)
+
+
+def test_poses_less_than_half_a_turn_apart_take_the_shorter_arc(clips):
+    one, two = (clips[name].rotation_wxyz[40:60] for name in ("step", "twist"))
+    share = np.linspace(0, 1, 20)
+    wanted = rotation.slerp(one, two, share[:, None])
+    np.testing.assert_allclose(rotation.angle_between(one_way_slerp(one, two, share), wanted), 0, atol=1e-7)
+    assert one_way_slerp(one[:0], two[:0], share[:0]).shape == (0, 22, 4)

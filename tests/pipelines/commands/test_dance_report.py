@@ -21,6 +21,9 @@ def test_facts_of_the_best_dance(built):
     report = dance_report.report_of(facts)
     assert "cost " in report
     assert "licence CC0-1.0: free to use" in report
+    assert facts["as_wanted"] is (facts["not_as_wanted"] == [])
+    assert facts["quality"]["one_frame_flip_count"] == len(facts["not_as_wanted"])
+    assert {*facts["missed"]} <= {*facts["quality"]}
 
 
 def test_alternatives_say_what_they_share(studio):
@@ -47,3 +50,21 @@ def test_one_dance_is_told_plainly_and_several_as_a_list():
     assert dance_report.dances_facts([{"a": 1}], [], 1) == {"a": 1}
     assert dance_report.dances_facts([], ["no", "no"], 1) == {"error": "no"}
     assert dance_report.dances_facts([{"a": 1}], ["no"], 2) == {"dances": [{"a": 1}], "troubles": ["no"]}
+
+
+def test_a_dance_that_flips_is_not_as_wanted_and_says_where():
+    flips = {
+        "value": 1.0,
+        "wanted": "0",
+        "is_passed": False,
+        "reasons": ["leftHand turns 149° … at 12.43 s, in a at 3 s"],
+    }
+    slides = {"value": 9.0, "wanted": "at most 1", "is_passed": False, "reasons": []}
+    report = {"wanted": {"one_frame_flip_count": flips, "foot_slide": slides, "other": {"is_passed": True}}}
+    assert dance_report.not_as_wanted(report) == flips["reasons"]
+    assert dance_report.missed(report) == ["foot_slide", "one_frame_flip_count"]
+    flips["reasons"] = []
+    assert dance_report.not_as_wanted(report) == ["one_frame_flip_count is 1, wanted is 0"]
+    flips["is_passed"] = True
+    assert dance_report.not_as_wanted(report) == []
+    assert dance_report.not_as_wanted({"wanted": {}}) == []
