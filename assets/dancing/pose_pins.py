@@ -25,6 +25,7 @@ from kernels.graph.pose_nodes import (
     song_moment,
 )
 from kernels.graph.transitions import THRESHOLD
+from kernels.runs import touches
 from kernels.types import Float, MotionGraph
 from schemas.keys import is_mirrored, mirrored, source_clip
 from schemas.pins import PinWish
@@ -72,13 +73,20 @@ class ClipPoses:
         Raises
         ------
         DirectionError
-            If the moment is not in the clip.
+            If the moment is not in the clip, or is never shown.
         """
         clip, at_s = wish.pose_moment
         for moved in self.read([clip]):
             if at_s > moved.duration_s + ON_TIME_S:
                 raise DirectionError(
                     f"{wish.text}: want a moment of {clip}, 0 to {moved.duration_s:.2f} s, got {at_s:g}"
+                )
+            if touches(moved.is_fenced, moved.frame_rate_hz, np.array([at_s]), np.array([at_s]))[0]:
+                shown_s = np.flatnonzero(~moved.is_fenced) / moved.frame_rate_hz
+                near_s = shown_s[np.abs(shown_s - at_s).argmin()]
+                raise DirectionError(
+                    f"{wish.text}: {clip} is never shown at {at_s:g} s, 'odori clips' says why; {near_s:.2f} s is the "
+                    "nearest that is"
                 )
             return _features(moved, np.array([at_s]))
         return None

@@ -219,7 +219,17 @@ def test_of_a_clip_without_beats_what_is_no_further_than_the_twentieth_nearest_b
             "is_kept": [True] * 20,
         }
     )
-    dance = CanonicalClip("dance", RATE_HZ, *swinging(*CLIPS["day-a"]))
+    dance = CanonicalClip("dance", RATE_HZ, *swinging(*CLIPS["day-a"]), NOTHING_FENCED)
     wish = parse_pin("2=pose:day-c@1.0")
     told = shown_pose(wish, 2.0, lineage("day-a", at_s), dance, ClipPoses(poses.stored, 1e-9), nodes)
     assert told["is_kept"] is is_kept
+
+
+def test_a_moment_that_is_never_shown_is_no_wish(in_memory):
+    is_fenced = np.zeros(N_FRAMES, bool)
+    is_fenced[30:36] = True
+    made = CanonicalClip("day-a", RATE_HZ, *swinging(*CLIPS["day-a"]), is_fenced)
+    poses = ClipPoses(in_memory({"day-a": from_canonical_pose("day-a", RATE_HZ, made, is_fenced)}))
+    with pytest.raises(DirectionError, match=r"day-a is never shown at 1.1 s, .*; 1.20 s is the nearest that is"):
+        poses.wanted(parse_pin("2=pose:day-a@1.1"))
+    assert poses.wanted(parse_pin("2=pose:day-a@1.2")) is not None
