@@ -55,6 +55,17 @@ class BodyInMotion:
         return sorted(needed)
 
     @cached_property
+    def step_deg(self) -> Float:
+        """Turn of each needed joint from frame to frame: axis times angle, (F - 1, N, 3), degrees."""
+        turn = self.clip.rotation_wxyz[:, self.needed]
+        return np.degrees(rotation.log(rotation.mul(rotation.inv(turn[:-1]), turn[1:])))
+
+    @cached_property
+    def step_size_deg(self) -> Float:
+        """Angles of :attr:`step_deg`, (F - 1, N), degrees."""
+        return np.asarray(np.sqrt(np.sum(self.step_deg * self.step_deg, axis=-1)), np.float64)
+
+    @cached_property
     def _placed(self) -> tuple[Float, Float]:
         clip = self.clip
         return kinematics.forward_some(
@@ -86,6 +97,8 @@ class BodyInMotion:
         -------
         (F, 3) float64, metres, world
         """
+        if len(names) == 1:
+            return self.position_xyz_m[:, self.at[names[0]]]
         return np.asarray(self.position_xyz_m[:, [self.at[name] for name in names]].mean(axis=1), np.float64)
 
     @cached_property

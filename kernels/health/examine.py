@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from kernels.health import glitches, one_body, righting
+from kernels.health import fills, glitches, one_body, righting, slides, stills
 from kernels.health.body_in_motion import BodyInMotion
+from kernels.health.plausible import implausible
 from kernels.health.speed_limit import LIMIT_DEG_PER_S, FastTurn, fast_turns
 from kernels.health.verdicts import ClipFault, ExaminedClip, fence_of
 from kernels.skeleton.naming import JointMapping
@@ -35,25 +36,37 @@ def examine(clip: Clip, mapping: JointMapping) -> ExaminedClip:
 
     Notes
     -----
-    First what was done to the whole: a second body, the path's unit, the up sign, the handedness. Each is put right
-    before the next is looked at, since that builds on it. Then single frames: jumps are mended or fenced, and last, in
-    what is left, no joint may turn faster than a dance may (:mod:`kernels.health.speed_limit`).
+    First what was done to the whole: a second body, the path's unit, the up sign, four legs and other doubts, the
+    handedness. Each is put right before the next is looked at, since that builds on it. Then stretches and frames:
+    calibration poses at the ends, gaps filled in straight lines, frozen frames; jumps are mended or fenced; then
+    slides. Last, in what is left to show, no joint may turn faster than a dance may
+    (:mod:`kernels.health.speed_limit`).
     """
     if clip.n_frames == 0:
         return ExaminedClip(clip)
     body = BodyInMotion(clip, mapping)
     faults: list[ClipFault] = []
-    for look in (one_body.more_bodies, righting.in_one_unit, righting.turned_upright, righting.unmirrored):
+    looks = (
+        one_body.more_bodies,
+        righting.in_one_unit,
+        righting.turned_upright,
+        implausible,
+        righting.unmirrored,
+    )
+    for look in looks:
         righted, found = look(body)
         faults += found
         if any(fault.verdict == "refused" for fault in found):
             return ExaminedClip(clip, tuple(faults))
         if righted is not None:
             body = BodyInMotion(righted, mapping)
-    mended, found = glitches.mend(body)
-    faults += found
-    if mended is not body.clip:
-        body = BodyInMotion(mended, mapping)
+    faults += stills.calibration_ends(body) + fills.straight_fills(body)
+    for mend in (stills.frozen, glitches.mend):
+        mended, found = mend(body, fence_of(faults, clip.n_frames))
+        faults += found
+        if mended is not body.clip:
+            body = BodyInMotion(mended, mapping)
+    faults += slides.slides(body, fence_of(faults, clip.n_frames))
     is_fenced = fence_of(faults, clip.n_frames)
     faults += glitches.told_once([_fenced(body, turn) for turn in fast_turns(body, is_fenced)])
     faults.sort(key=lambda fault: (fault.first, fault.last, fault.kind, fault.joint))
@@ -85,4 +98,5 @@ def _little_left(body: BodyInMotion, faults: list[ClipFault]) -> list[ClipFault]
     worst = max((f for f in faults if f.verdict == "fenced"), key=lambda f: f.last - f.first)
     whole_s = body.clip.n_frames / body.clip.frame_rate_hz
     said = f"{left_s:.2f} s of {whole_s:.2f} s are left to show; most is lost to: {worst.reason}"
+    said = "; ".join([said, *(fault.reason for fault in faults if fault.verdict == "doubtful")])
     return [replace(worst, first=0, last=body.clip.n_frames - 1, verdict="refused", reason=said)]

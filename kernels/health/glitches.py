@@ -16,11 +16,11 @@ from kernels.health.speed_limit import LIMIT_DEG_PER_S
 from kernels.health.verdicts import ClipFault
 from kernels.types import Clip, Float
 
-_PLAIN_DEG = 3.0
+_PLAIN_DEG = 2.5
 """How far the same curve may miss frames just before and after a gap, so that it is mended. Chosen by hand, near what
 anybody sees."""
 
-_PLAIN_ONE_DEG = 5.0
+_PLAIN_ONE_DEG = 4.0
 """The same for a gap of one frame. Chosen by hand: a frame that is a little off is better than a hole in a dance."""
 
 _PLAIN_M = 0.01
@@ -54,12 +54,14 @@ class _Channel:
     unit: str
 
 
-def mend(body: BodyInMotion) -> tuple[Clip, list[ClipFault]]:
+def mend(body: BodyInMotion, is_hidden: NDArray[np.bool_]) -> tuple[Clip, list[ClipFault]]:
     """Mend and fence what jumps.
 
     Parameters
     ----------
     body : BodyInMotion of F frames
+    is_hidden : (F,) bool
+        Frames that are fenced already: jumps within them or at their edges are theirs.
 
     Returns
     -------
@@ -72,12 +74,12 @@ def mend(body: BodyInMotion) -> tuple[Clip, list[ClipFault]]:
         return clip, []
     faults: list[ClipFault] = []
     turns = _turns(body)
-    turned, found = _mended(body, turns)
+    turned, found = _mended(body, turns, is_hidden)
     faults += found
     rotation_wxyz = clip.rotation_wxyz.copy()
     rotation_wxyz[:, body.needed] = turned
     moving = _moving(body)
-    placed, found = _mended(body, _places(body, moving))
+    placed, found = _mended(body, _places(body, moving), is_hidden)
     faults += found
     translation = clip.translation_xyz_m
     if translation is not None and len(moving):
@@ -119,7 +121,6 @@ def told_once(faults: list[ClipFault]) -> list[ClipFault]:
 def _turns(body: BodyInMotion) -> _Channel:
     clip = body.clip
     value = clip.rotation_wxyz[:, body.needed]
-    step = np.degrees(rotation.log(rotation.mul(rotation.inv(value[:-1]), value[1:])))
 
     def apart(signal: int, a: int, b: int) -> float:
         return float(np.degrees(rotation.angle_between(value[a, signal], value[b, signal])))
@@ -128,7 +129,7 @@ def _turns(body: BodyInMotion) -> _Channel:
         kind="flip",
         value=value,
         names=[clip.skeleton.joints[k] for k in body.needed],
-        step=step,
+        step=body.step_deg,
         least=jumps.bound(jumps.TURN_DEG, jumps.TURN_LEAST_DEG, clip.frame_rate_hz),
         plain=(_PLAIN_ONE_DEG, _PLAIN_DEG),
         apart=apart,
@@ -169,11 +170,11 @@ def _places(body: BodyInMotion, moving: NDArray[np.int64]) -> _Channel:
     )
 
 
-def _mended(body: BodyInMotion, channel: _Channel) -> tuple[Float, list[ClipFault]]:
+def _mended(body: BodyInMotion, channel: _Channel, is_hidden: NDArray[np.bool_]) -> tuple[Float, list[ClipFault]]:
     """Values with what is plain mended, and the faults."""
     n_frames, rate_hz = len(channel.value), body.clip.frame_rate_hz
     found = jumps.find_bursts(channel.step, channel.apart, least=channel.least, frame_rate_hz=rate_hz)
-    found = jumps.merged(found)
+    found = [burst for burst in jumps.merged(found) if not _is_hidden(burst, is_hidden)]
     cuts = _cuts(found, len(channel.names))
     value = channel.value.copy()
     faults: list[ClipFault] = []
@@ -182,7 +183,7 @@ def _mended(body: BodyInMotion, channel: _Channel) -> tuple[Float, list[ClipFaul
     for burst in found:
         by_signal.setdefault(burst.signal, []).append(burst)
     for signal, bursts in by_signal.items():
-        is_good = np.ones(n_frames, bool)
+        is_good = ~is_hidden
         for burst in bursts:
             if burst.n_sharp > 1:
                 is_good[burst.first : burst.last + 1] = False
@@ -207,6 +208,12 @@ def _mended(body: BodyInMotion, channel: _Channel) -> tuple[Float, list[ClipFaul
                 put_right = f"{said} and comes back; mended by a cubic from the frames around"
                 faults.append(ClipFault(kind, name, burst.first, burst.last, "mended", put_right))
     return value, sorted(faults, key=lambda fault: (fault.first, fault.last))
+
+
+def _is_hidden(burst: Burst, is_hidden: NDArray[np.bool_]) -> bool:
+    """Whether every step of a burst is from or to a frame that is fenced already."""
+    first, last = (burst.first, burst.last) if burst.n_sharp == 1 else (burst.first - 1, burst.last + 1)
+    return bool((is_hidden[first:last] | is_hidden[first + 1 : last + 1]).all())
 
 
 def _cuts(found: list[Burst], n_signals: int) -> set[int]:

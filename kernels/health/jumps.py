@@ -151,8 +151,14 @@ def sharp_steps(step: Float, size: Float, *, least: float, frame_rate_hz: float)
 
 def _usual(size: Float, length: int) -> Float:
     n = len(size)
-    pieces = [np.median(size[a : a + length], axis=0) for a in range(0, max(n - length // 2, 1), length)]
-    median = np.stack([pieces[0], *pieces, pieces[-1]])
+    n_pieces = max(round(n / length), 1)
+    if n >= length:
+        whole = size[: n_pieces * length] if n_pieces * length <= n else size[-n_pieces * length :]
+        n_pieces = len(whole) // length
+        pieces = np.median(whole[: n_pieces * length].reshape(n_pieces, length, -1), axis=1)
+    else:
+        pieces = np.median(size, axis=0)[None]
+    median = np.concatenate([pieces[:1], pieces, pieces[-1:]])
     widest = np.maximum(np.maximum(median[:-2], median[1:-1]), median[2:])
     of = np.minimum(np.arange(n) // length, len(widest) - 1)
     return np.asarray(widest[of], np.float64)

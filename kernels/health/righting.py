@@ -33,6 +33,9 @@ _BENT_RATIO = 0.02
 _POINTING_RATIO = 0.3
 """Cosine between foot and facing that tells ahead from behind. Chosen by hand."""
 
+_BACKWARDS_COS = 0.6
+"""Cosine between foot and facing, below whose opposite toes point behind, whatever the knees. Chosen by hand."""
+
 _BACKWARDS_RATIO = 0.05
 """How far, in legs, knees bend backwards that no knee does. Chosen by hand: three degrees more than overstretched."""
 
@@ -103,11 +106,13 @@ def unmirrored(body: BodyInMotion) -> tuple[Clip | None, list[ClipFault]]:
     knee = float(np.median(knees)) if len(knees) else 0.0
     toe = float(np.median(toes)) if len(toes) else 0.0
     is_behind = knee < -_BENT_RATIO if len(knees) else False
-    if is_behind and (toe < -_POINTING_RATIO or (not len(toes) and knee < -_BACKWARDS_RATIO)):
+    by_toes = toe < -_POINTING_RATIO and (is_behind or (not len(knees) and toe < -_BACKWARDS_COS))
+    if by_toes or (is_behind and not len(toes) and knee < -_BACKWARDS_RATIO):
+        what = [f"knees bend {-100 * knee * body.leg_m:.0f} cm behind the hips"] if len(knees) else []
+        what += ["toes point behind"] if len(toes) else []
         said = (
-            f"left and right are exchanged: knees bend {-100 * knee * body.leg_m:.0f} cm behind the hips, want ahead"
-            + (", and toes point behind" if len(toes) else "")
-            + "; mirrored back; export without changing the handedness"
+            f"left and right are exchanged: {' and '.join(what)}, want ahead; mirrored back; "
+            "export without changing the handedness"
         )
         mirrored = _mapped(body.clip, np.array([-1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0]))
         return mirrored, [body.whole("mirrored", "mended", said)]

@@ -16,6 +16,10 @@ def body(clip):
     return BodyInMotion(clip, map_joints(clip.skeleton))
 
 
+def none(clip):
+    return np.zeros(clip.n_frames, bool)
+
+
 def spoilt(clip, joints, frames, angle_rad):
     q = clip.rotation_wxyz.copy()
     for joint in joints:
@@ -26,12 +30,12 @@ def spoilt(clip, joints, frames, angle_rad):
 
 def test_a_clean_take_comes_back_as_it_is():
     clip = dancer.take("kick").clip
-    assert glitches.mend(body(clip)) == (clip, [])
+    assert glitches.mend(body(clip), none(clip)) == (clip, [])
 
 
 def test_several_joints_of_one_frame_are_mended_and_told_once():
     clip = dancer.take("twist").clip
-    mended, (fault,) = glitches.mend(body(spoilt(clip, ["head", "leftHand", "rightFoot"], [31], 1.2)))
+    mended, (fault,) = glitches.mend(body(spoilt(clip, ["head", "leftHand", "rightFoot"], [31], 1.2)), none(clip))
     assert (fault.kind, fault.verdict, fault.first, fault.last) == ("flip", "mended", 31, 31)
     assert "so do 2 more joints" in fault.reason
     assert np.degrees(rotation.angle_between(mended.rotation_wxyz, clip.rotation_wxyz)).max() < 1.0
@@ -39,10 +43,10 @@ def test_several_joints_of_one_frame_are_mended_and_told_once():
 
 def test_a_few_frames_are_mended_and_many_are_fenced():
     clip = dancer.take("bounce", frame_rate_hz=60.0).clip
-    _, (few,) = glitches.mend(body(spoilt(clip, ["leftUpperArm"], range(80, 85), 1.2)))
+    _, (few,) = glitches.mend(body(spoilt(clip, ["leftUpperArm"], range(80, 85), 1.2)), none(clip))
     assert (few.verdict, few.first, few.last) == ("mended", 80, 84)
     bad = spoilt(clip, ["leftUpperArm"], range(80, 110), 1.2)
-    same, (many,) = glitches.mend(body(bad))
+    same, (many,) = glitches.mend(body(bad), none(clip))
     assert (many.verdict, many.first, many.last) == ("fenced", 79, 110)
     assert "not shown" in many.reason
     assert same is bad
@@ -50,18 +54,18 @@ def test_a_few_frames_are_mended_and_many_are_fenced():
 
 def test_a_bad_first_or_last_frame_is_fenced_since_one_side_is_missing():
     clip = dancer.take("bounce").clip
-    _, faults = glitches.mend(body(spoilt(clip, ["leftUpperArm"], [0], 1.2)))
+    _, faults = glitches.mend(body(spoilt(clip, ["leftUpperArm"], [0], 1.2)), none(clip))
     assert [(f.verdict, f.first) for f in faults] == [("fenced", 0)]
-    _, faults = glitches.mend(body(spoilt(clip, ["leftUpperArm"], [clip.n_frames - 1], 1.2)))
+    _, faults = glitches.mend(body(spoilt(clip, ["leftUpperArm"], [clip.n_frames - 1], 1.2)), none(clip))
     assert [(f.verdict, f.last) for f in faults] == [("fenced", clip.n_frames - 1)]
 
 
 def test_takes_that_were_joined_are_cut_where_many_joints_jump_together():
     clip = dancer.take("idle").clip
     many = ["leftUpperArm", "rightUpperArm", "leftLowerArm", "rightLowerArm", "head", "spine"]
-    _, faults = glitches.mend(body(spoilt(clip, many, range(100, clip.n_frames), 0.6)))
+    _, faults = glitches.mend(body(spoilt(clip, many, range(100, clip.n_frames), 0.6)), none(clip))
     assert {(f.verdict, f.first, f.last) for f in faults} == {("fenced", 99, 100)}
-    assert glitches.mend(body(spoilt(clip, many[:1], range(100, clip.n_frames), 0.6)))[1] == []
+    assert glitches.mend(body(spoilt(clip, many[:1], range(100, clip.n_frames), 0.6)), none(clip))[1] == []
 
 
 def test_faults_of_one_kind_in_the_same_frames_are_told_once():
