@@ -24,6 +24,9 @@ _EULER_RATIO = 0.7
 """How much a turn changes, over its square in radians, where angles and not rotations go at a constant pace. Chosen by
 hand; by the products of two angles' paces it is at most 1."""
 
+_MOST_EULER_DEG = 3.0
+"""Turn in a step up to which its square counts; above, smooth motion would pass for filled. Chosen by hand."""
+
 _RESOLUTION_DEG = 0.02
 """Sum over all joints that rounding in a file may come to. Chosen by hand."""
 
@@ -36,8 +39,8 @@ _MOVING_DEG = 0.5
 """Sum of all joints' turns in a 30th of a second from which there is motion to be filled; a centimetre of the hips
 counts as a degree. Chosen by hand."""
 
-_SHORTEST_S = 0.2
-"""Chosen by hand: shorter, a body may well go straight on. No other stretch of 500 clean takes is longer than 0.1."""
+_SHORTEST_S = 0.25
+"""Chosen by hand: shorter, a body may well go straight on. In 334 clean takes nothing else is longer than 0.1."""
 
 
 def straight_fills(body: BodyInMotion) -> list[ClipFault]:
@@ -79,7 +82,7 @@ def _is_straight(body: BodyInMotion, stride: int) -> NDArray[np.bool_]:
     paced = np.linalg.norm(way, axis=-1)[:-stride]
     change = np.linalg.norm(step[stride:] - step[:-stride], axis=-1).sum(axis=1)
     change = change + np.linalg.norm(way[stride:] - way[:-stride], axis=-1)
-    allowed = (_PACE_RATIO + _EULER_RATIO * np.radians(size)) * size
+    allowed = (_PACE_RATIO + _EULER_RATIO * np.radians(np.minimum(size, _MOST_EULER_DEG))) * size
     allowed_in_all = allowed.sum(axis=1) + 2 * _PACE_RATIO * paced + _RESOLUTION_DEG
     is_alive = ((size > _LIVE_DEG).sum(axis=1) >= _FEWEST_LIVE) & (size.sum(axis=1) + paced > _MOVING_DEG)
     return np.asarray((change < allowed_in_all) & is_alive, np.bool_)

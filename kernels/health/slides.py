@@ -73,10 +73,14 @@ def slides(body: BodyInMotion, is_hidden: NDArray[np.bool_]) -> list[ClipFault]:
 
 
 def _glide(body: BodyInMotion) -> Float:
-    """Horizontal speed of whichever point of the feet is slowest, over a 30th of a second; (F - 1,)."""
+    """Horizontal speed of whichever point is slowest, over a 30th of a second; (F - 1,).
+
+    The points are those of the feet and the one between them, about which a body spins on both.
+    """
     rate_hz = body.clip.frame_rate_hz
     n = max(round(rate_hz / 30.0), 1)
-    step = np.diff(body.feet[..., ::2], axis=0)
+    middle = body.place("leftFoot", "rightFoot")[:, None]
+    step = np.diff(np.concatenate([body.feet, middle], axis=1)[..., ::2], axis=0)
     if n > 1:
         total = np.cumsum(np.concatenate([np.zeros((1, *step.shape[1:])), step]), axis=0)
         after = np.minimum(np.arange(len(step)) + (n + 1) // 2, len(step))

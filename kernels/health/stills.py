@@ -104,7 +104,7 @@ def frozen(body: BodyInMotion, is_hidden: NDArray[np.bool_]) -> tuple[Clip, list
             usual > _MOVING_DEG
             and n <= mending.longest_gap(rate_hz)
             and last + 1 < len(motion)
-            and motion[last + 1] / usual > 1 + n * (_CAUGHT_UP_RATIO - 1)
+            and motion[last + 1] > (1 + n * (_CAUGHT_UP_RATIO - 1)) * _beside(motion, first, last)
         ):
             twice.append((first + 1, last + 1))
     mended, done, left = _filled(body, twice)
@@ -160,6 +160,12 @@ def calibration_ends(body: BodyInMotion) -> list[ClipFault]:
             faults.append(ClipFault("tpose", "", max(first, 0), last, "fenced", said))
             break
     return faults
+
+
+def _beside(motion: Float, first: int, last: int) -> float:
+    """Mean motion just before a still stretch and after the step that catches up."""
+    beside = [motion[k] for k in (first - 1, last + 2) if 0 <= k < len(motion) and motion[k] > _STILL_DEG]
+    return float(np.mean(beside)) if beside else np.inf
 
 
 def _motion_deg(body: BodyInMotion) -> Float:
