@@ -43,8 +43,8 @@ CLIP = Table(
     ),
 )
 
-QUIET_FAULT_KINDS = ("fast", "trimmed")
-"""Kinds of fault nobody has to look at: motion that is real, and what the studio cut off itself."""
+QUIET_FAULT_KINDS = ("fast", "tpose", "trimmed")
+"""Kinds of fault nobody has to look at: motion that is real, a calibration pose at an end, what the studio cut off."""
 
 VERDICTS = ("mended", "fenced", "doubtful", "refused")
 
