@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import dagster as dg
 import pyarrow as pa
 
-from assets.declare import code_version, table_asset
+from assets.declare import code_version, table_asset, table_assets
 from assets.partitions import SESSION
 from assets.plots import matching as matching_plots
 from assets.plots.motion import session_beats
@@ -19,6 +20,7 @@ from assets.tables import pack
 from assets.tables.motion import (
     from_canonical_pose,
     from_motion_beat,
+    from_motion_tempo,
     to_canonical_pose,
     to_fence,
     to_pose,
@@ -27,15 +29,17 @@ from assets.tables.motion import (
 from kernels import rotation
 from kernels.health.bridging import bridge
 from kernels.hmm.states import assign
-from kernels.motion.motion_beats import BeatSettings, motion_beats
+from kernels.motion.dance_pulse import DancePulse, dance_pulse
+from kernels.motion.motion_beats import BeatSettings, MotionBeats, motion_beats
 from kernels.motion.motion_features import contacts_at_feature_rate, fence_at_feature_rate, motion_features
 from kernels.motion.velocity import usable_frames
 from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.contacts import foot_contacts
 from kernels.skeleton.retarget import retarget
 from schemas.hmm import BASIC_MOTION, KEY_POSE
-from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE
+from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE, MOTION_TEMPO
 from schemas.settings import FeatureSettings, MotionBeatSettings
+from schemas.table import Table
 
 
 @table_asset(CANONICAL_POSE, group="motion", code_version="2", partitions=SESSION)
@@ -73,31 +77,50 @@ def canonical_pose(
     return Parts(session(key) for key in _begun(progress, "canonical poses", pose))
 
 
-@table_asset(MOTION_BEAT, group="motion", code_version="2", settings="motion_beat", partitions=SESSION)
-def motion_beat(
+@table_assets(
+    "motion_beats",
+    (MOTION_BEAT, MOTION_TEMPO),
+    group="motion",
+    code_version="3",
+    settings="motion_beat",
+    partitions=SESSION,
+)
+def motion_beats_and_tempi(
     context: dg.AssetExecutionContext,
     canonical_pose: Stored,
     clip: Stored,
     studio: dg.ResourceParam[Studio],
     earlier: dg.ResourceParam[Earlier],
     progress: dg.ResourceParam[Progress],
-) -> Parts:
-    """Find the beats of every clip by windowed principal components."""
+) -> Iterator[dg.Output[Parts]]:
+    """Find the beats and the tempo of every clip, or that it has no pulse."""
     settings = studio.settings().motion_beat
     code = version_of(code_version(context, MOTION_BEAT.name), repr(settings))
+    tempi: list[Part] = []
 
     def session(key: str) -> Part:
         poses = pack.by_clip(canonical_pose.read(key))
+        found: dict[str, tuple[pa.Table, pa.Table]] = {}
 
-        def one(clip_id: str) -> pa.Table:
-            return beats_of(poses[clip_id], settings) if clip_id in poses else MOTION_BEAT.empty()
+        def one(clip_id: str, which: int, table: Table) -> pa.Table:
+            if clip_id not in poses:
+                return table.empty()
+            if clip_id not in found:
+                found[clip_id] = beats_of(poses[clip_id], settings)
+            return found[clip_id][which]
 
         made_from = clip_versions(canonical_pose, key, code)
-        part = per_clip(MOTION_BEAT, key, made_from, one, earlier=earlier, progress=progress)
+        part, tempo = (
+            per_clip(table, key, made_from, partial(one, which=which, table=table), earlier=earlier, progress=told)
+            for which, (table, told) in enumerate(((MOTION_BEAT, progress), (MOTION_TEMPO, None)))
+        )
+        tempi.append(tempo)
         picture = dg.MetadataValue.md(session_beats(part.table, clip.read(key)))
-        return replace(part, metadata={**part.metadata, "beats": picture})
+        without = tempo.table.num_rows - int(pack.to_numbers(tempo.table["has_pulse"]).sum())
+        return replace(part, metadata={**part.metadata, "beats": picture, "clips_without_pulse": without})
 
-    return Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose))
+    yield dg.Output(Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose)), MOTION_BEAT.name)
+    yield dg.Output(Parts(tempi), MOTION_TEMPO.name)
 
 
 @table_asset(MOTION_FEATURE, group="motion", code_version="3", settings="feature", partitions=SESSION)
@@ -160,8 +183,8 @@ def key_pose(
     return Parts(session(key) for key in _begun(progress, "key poses", canonical_pose))
 
 
-def beats_of(rows: pa.Table, settings: MotionBeatSettings) -> pa.Table:
-    """Find the beats of one clip in the frames of it that are usable.
+def beats_of(rows: pa.Table, settings: MotionBeatSettings) -> tuple[pa.Table, pa.Table]:
+    """Find the beats and the tempo of one clip in the frames of it that are usable.
 
     Parameters
     ----------
@@ -170,7 +193,7 @@ def beats_of(rows: pa.Table, settings: MotionBeatSettings) -> pa.Table:
 
     Returns
     -------
-    table ``motion_beat``, a row a beat
+    table ``motion_beat``, a row a beat, and table ``motion_tempo``, one row
 
     Raises
     ------
@@ -180,10 +203,15 @@ def beats_of(rows: pa.Table, settings: MotionBeatSettings) -> pa.Table:
     moved = to_canonical_pose(rows)
     first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
     kept = slice(first, last + 1)
-    heading = rotation.heading_rad(moved.rotation_wxyz[:, 0])[kept] if settings.frame == "body" else None
-    position, how = moved.position_xyz_m[kept], beat_settings(settings)
-    beats = motion_beats(position, moved.frame_rate_hz, heading_rad=heading, settings=how)
-    return from_motion_beat(moved.clip_id, beats, moved.frame_rate_hz, first_frame=first, is_fenced=moved.is_fenced)
+    position, rate_hz = moved.position_xyz_m[kept], moved.frame_rate_hz
+    beats: MotionBeats | DancePulse
+    if settings.method == "pulse":
+        beats = dance_pulse(position, rate_hz)
+    else:
+        heading = rotation.heading_rad(moved.rotation_wxyz[:, 0])[kept] if settings.frame == "body" else None
+        beats = motion_beats(position, rate_hz, heading_rad=heading, settings=beat_settings(settings))
+    table = from_motion_beat(moved.clip_id, beats, rate_hz, first_frame=first, is_fenced=moved.is_fenced)
+    return table, from_motion_tempo(moved.clip_id, beats, beat_count=table.num_rows)
 
 
 def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
@@ -215,7 +243,7 @@ def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:
 
 
 def beat_settings(settings: MotionBeatSettings) -> BeatSettings:
-    """Turn the names of ``odori.toml`` into what the kernel takes.
+    """Turn the names of ``odori.toml`` into what the search by principal components takes.
 
     Parameters
     ----------
@@ -227,7 +255,8 @@ def beat_settings(settings: MotionBeatSettings) -> BeatSettings:
         If a joint is none of the canonical skeleton.
     """
     joints = tuple(CANONICAL.index(name) for name in settings.joints)
-    return BeatSettings(settings.component, joints, settings.method, settings.extrema_per_beat)  # type: ignore[arg-type]
+    method = "fft" if settings.method == "pulse" else settings.method
+    return BeatSettings(settings.component, joints, method, settings.extrema_per_beat)  # type: ignore[arg-type]
 
 
 def _begun(progress: Progress, what: str, upstream: Stored) -> Iterator[str]:

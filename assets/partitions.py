@@ -18,6 +18,7 @@ SESSION_TABLES = (
     "canonical_pose",
     "motion_feature",
     "motion_beat",
+    "motion_tempo",
     "key_pose",
     "motion_embedding",
 )

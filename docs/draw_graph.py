@@ -28,6 +28,7 @@ PLACES = {
     "clip_fault": (1, -1),
     "canonical_pose": (2, 1.5),
     "motion_beat": (2, 0.3),
+    "motion_tempo": (3, -0.6),
     "motion_graph_node": (3, 0.3),
     "motion_graph_edge": (3, 1.4),
     "song (table)": (1, 4.0),

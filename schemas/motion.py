@@ -152,8 +152,8 @@ MOTION_FEATURE = Table(
 
 MOTION_BEAT = Table(
     name="motion_beat",
-    version=1,
-    meaning="One beat of one clip, found by windowed principal components.",
+    version=2,
+    meaning="One beat of one clip: a stop of the body at its pulse, or a turn of its largest movement.",
     key=("clip_id", "beat_index"),
     columns=(
         f.CLIP_ID,
@@ -161,10 +161,38 @@ MOTION_BEAT = Table(
         f.FRAME_INDEX,
         f.TIME_S,
         f.CONFIDENCE_RATIO,
-        Column("interval_s", pa.float32(), "Beat interval of the clip."),
+        Column("interval_s", pa.float32(), "Mean beat interval of the clip; beats of a pulse may breathe about it."),
         Column(
-            "component_share_ratio", pa.float32(), "Share of the clip's variance that the beat's component carries."
+            "component_share_ratio",
+            pa.float32(),
+            "Share of the clip's variance that the beat's component carries; 0 of a pulse, which has none.",
         ),
-        Column("peak_share_ratio", pa.float32(), "Share of the beat curve's spectrum inside its peak."),
+        Column("peak_share_ratio", pa.float32(), "Share of the beat curve's spectrum inside its peak; 0 of a pulse."),
+    ),
+)
+
+MOTION_TEMPO = Table(
+    name="motion_tempo",
+    version=1,
+    meaning="Tempo of one clip, or that its motion has no pulse.",
+    key=("clip_id",),
+    columns=(
+        f.CLIP_ID,
+        Column("tempo_bpm", pa.float32(), "Tempo of the clip's beats; null where it has no pulse.", is_optional=True),
+        Column(
+            "confidence_probability",
+            pa.float32(),
+            "That the tempo is the dancer's, up to an octave; of principal components their confidence.",
+        ),
+        Column("has_pulse", pa.bool_(), "Whether the clip has beats."),
+        Column("slower_bpm", pa.float32(), "Half the tempo, where that is a level too; else null.", is_optional=True),
+        Column("faster_bpm", pa.float32(), "Twice the tempo, where that is a level too; else null.", is_optional=True),
+        Column(
+            "level_probability",
+            pa.float32(),
+            "That this level is the one counted, and not the slower or the faster; 0 of principal components.",
+        ),
+        Column("tempo_spread_ratio", pa.float32(), "Standard deviation of the beat intervals over their mean."),
+        Column("beat_count", pa.int32(), "Beats of the clip."),
     ),
 )

@@ -53,9 +53,14 @@ class CalibrationSettings(_Checked):
 
 @dataclass(frozen=True)
 class MotionBeatSettings(_Checked):
-    """How the beats of a clip are found [Xu2015]."""
+    """How the beats of a clip are found."""
 
-    method: str = key("fft", "'fft', as [Xu2015] has it, or 'autocorrelation'.", values=("fft", "autocorrelation"))
+    method: str = key(
+        "pulse",
+        "'pulse': the stops of the body, none without a pulse; principal components [Xu2015]: 'fft', as they have it, "
+        "or 'autocorrelation'. The other keys are of the last two.",
+        values=("pulse", "fft", "autocorrelation"),
+    )
     component: int = key(1, "Principal component that carries the beat, from 1.", least=1, most=22)
     frame: str = key(
         "body", "'body': joints seen from where the dancer faces; 'world': as [Xu2015].", values=("body", "world")

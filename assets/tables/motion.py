@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from assets.tables.pack import (
     by_clip,
     frame_rate_hz,
+    from_rows,
     to_array,
     to_numbers,
     vector,
@@ -19,12 +20,13 @@ from assets.tables.pack import (
 )
 from kernels.health.turns import around
 from kernels.health.verdicts import ClipFault
+from kernels.motion.dance_pulse import DancePulse, other_levels
 from kernels.motion.motion_beats import MotionBeats
 from kernels.skeleton.canonical import JOINTS
 from kernels.skeleton.naming import JointMapping
 from kernels.skeleton.retarget import CanonicalMotion
 from kernels.types import Clip, Float, Skeleton
-from schemas.motion import CANONICAL_POSE, CLIP_FAULT, MOTION_BEAT, POSE, SKELETON
+from schemas.motion import CANONICAL_POSE, CLIP_FAULT, MOTION_BEAT, MOTION_TEMPO, POSE, SKELETON
 
 Mask = NDArray[np.bool_]
 
@@ -166,7 +168,12 @@ def to_canonical_poses(table: pa.Table) -> Iterator[CanonicalClip]:
 
 
 def from_motion_beat(
-    clip_id: str, beats: MotionBeats, frame_rate_hz: float, *, first_frame: int = 0, is_fenced: Mask | None = None
+    clip_id: str,
+    beats: MotionBeats | DancePulse,
+    frame_rate_hz: float,
+    *,
+    first_frame: int = 0,
+    is_fenced: Mask | None = None,
 ) -> pa.Table:
     """Pack the beats of a clip, B rows, none when it has none; found in the clip from ``first_frame`` on.
 
@@ -177,14 +184,62 @@ def from_motion_beat(
         frame = np.round(time_s * frame_rate_hz).astype(np.int64)
         time_s = time_s[~is_fenced[np.clip(frame, 0, len(is_fenced) - 1)]]
     b = len(time_s)
+    if isinstance(beats, DancePulse):
+        confidence, shares = beats.confidence_probability, (0.0, 0.0)
+        interval_s = 60.0 / beats.tempo_bpm if b else 0.0
+    else:
+        confidence, interval_s = beats.confidence, beats.interval_s
+        shares = beats.component_share, beats.peak_share
     columns = [
         pa.array([clip_id] * b, pa.string()),
         pa.array(np.arange(b), pa.int32()),
         pa.array(np.round(time_s * frame_rate_hz), pa.int32()),
         pa.array(time_s),
-        pa.array(np.full(b, beats.confidence), pa.float32()),
-        pa.array(np.full(b, beats.interval_s), pa.float32()),
-        pa.array(np.full(b, beats.component_share), pa.float32()),
-        pa.array(np.full(b, beats.peak_share), pa.float32()),
+        *(pa.array(np.full(b, value), pa.float32()) for value in (confidence, interval_s, *shares)),
     ]
     return MOTION_BEAT.check(pa.table(columns, schema=MOTION_BEAT.arrow))
+
+
+def from_motion_tempo(clip_id: str, beats: MotionBeats | DancePulse, *, beat_count: int) -> pa.Table:
+    """Pack the tempo of a clip, one row; ``beat_count`` are the beats of it that may be shown."""
+    has_pulse = len(beats.time_s) > 0
+    if isinstance(beats, DancePulse):
+        tempo, levels = beats.tempo_bpm, (beats.slower_bpm, beats.faster_bpm)
+        confidence, level, spread = beats.confidence_probability, beats.level_probability, beats.spread_ratio
+    else:
+        tempo = 60.0 / beats.interval_s if has_pulse else 0.0
+        levels, confidence, level, spread = other_levels(tempo), beats.confidence, 0.0, 0.0
+    row = {
+        "clip_id": clip_id,
+        "tempo_bpm": tempo if has_pulse else None,
+        "confidence_probability": confidence,
+        "has_pulse": has_pulse,
+        "slower_bpm": levels[0] if has_pulse and levels[0] else None,
+        "faster_bpm": levels[1] if has_pulse and levels[1] else None,
+        "level_probability": level if has_pulse else 0.0,
+        "tempo_spread_ratio": spread if has_pulse else 0.0,
+        "beat_count": beat_count,
+    }
+    return from_rows(MOTION_TEMPO, [row])
+
+
+@dataclass(frozen=True)
+class ClipTempo:
+    """Tempo of a clip; ``tempo_bpm`` is 0 where it has no pulse, a level is 0 where it is none."""
+
+    tempo_bpm: float
+    confidence_probability: float
+    slower_bpm: float
+    faster_bpm: float
+    level_probability: float
+
+    @property
+    def has_pulse(self) -> bool:
+        """Whether the clip has beats."""
+        return self.tempo_bpm > 0
+
+
+def to_motion_tempo(table: pa.Table) -> dict[str, ClipTempo]:
+    """Unpack the tempi of clips, by clip."""
+    names = ("tempo_bpm", "confidence_probability", "slower_bpm", "faster_bpm", "level_probability")
+    return {row["clip_id"]: ClipTempo(*(row[name] or 0.0 for name in names)) for row in table.to_pylist()}

@@ -67,7 +67,7 @@ def test_plain_dagster_works_on_the_same_studio(studio):
     done = subprocess.run(
         [
             *(sys.executable, "-m", "dagster", "asset", "materialize", "-m", "pipelines.definitions"),
-            *("--select", "motion_beat", "--partition", "kaede"),
+            *("--select", "motion_beat,motion_tempo", "--partition", "kaede"),
         ],
         env={"ODORI_STUDIO": str(studio), "DAGSTER_HOME": str(studio / ".dagster"), "PATH": "/usr/bin:/bin"},
         capture_output=True,

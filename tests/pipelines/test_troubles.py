@@ -84,19 +84,19 @@ def test_settings_edited_during_a_run_count_next_time(studio, monkeypatch):
     from assets import motion
 
     settings = studio / "odori.toml"
-    settings.write_text("[motion_beat]\ncomponent = 2\n")
+    settings.write_text("[motion_beat]\nmethod = 'fft'\ncomponent = 2\n")
     real = motion.motion_beats
 
     def edit(*arguments, **more):
-        settings.write_text("[motion_beat]\ncomponent = 3\n")
+        settings.write_text("[motion_beat]\nmethod = 'fft'\ncomponent = 3\n")
         return real(*arguments, **more)
 
     folder = StudioFolder(studio)
     monkeypatch.setattr(motion, "motion_beats", edit)
-    batch = building.Batch("rebuild_motion", ("motion_beat",), ("ayame", "kaede"))
+    batch = building.Batch("rebuild_motion", ("motion_beat", "motion_tempo"), ("ayame", "kaede"))
     assert building.execute(batch, build_definitions(folder).resolve_job_def, building.open_instance(folder)) == []
     assert freshness(folder).state("motion_beat", "ayame").state == "stale"
-    settings.write_text("[motion_beat]\ncomponent = 2\n")
+    settings.write_text("[motion_beat]\nmethod = 'fft'\ncomponent = 2\n")
     assert freshness(folder).state("motion_beat", "ayame").state == "fresh"
 
 

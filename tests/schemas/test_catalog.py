@@ -11,6 +11,7 @@ PROMISED = {
     "state reason",
     "canonical_pose": "clip_id frame_index time_s root_xyz_m rotation_wxyz position_xyz_m",
     "motion_beat": "clip_id beat_index time_s frame_index confidence",
+    "motion_tempo": "clip_id tempo_bpm confidence_probability has_pulse",
     "music_beat": "song_id beat_index time_s bar_number beat_in_bar_number confidence",
     "motion_feature": "clip_id time_s rhythm intensity",
     "music_feature": "song_id time_s rhythm intensity",

@@ -33,7 +33,7 @@ def test_every_key_has_a_meaning(record):
 @pytest.mark.parametrize(
     ("kind", "wrong", "word"),
     [
-        (MotionBeatSettings, {"method": "guess"}, "want one of fft, autocorrelation, got 'guess'"),
+        (MotionBeatSettings, {"method": "guess"}, "want one of pulse, fft, autocorrelation, got 'guess'"),
         (MotionBeatSettings, {"component": 0}, "component: want 1 to 22, got 0"),
         (MotionGraphSettings, {"neighbours": -1}, "neighbours"),
         (

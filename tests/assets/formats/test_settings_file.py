@@ -48,7 +48,7 @@ def test_file_with_byte_order_mark(tmp_path):
         ("[motion_graph]\nneighbours = 1.5", "want a whole number"),
         ("[motion_graph]\nneighbours = true", "want a whole number"),
         ("[motion_beat]\njoints = 'leftFoot'", "want a list of texts"),
-        ("[motion_beat]\nmethod = 'fff'", "\\[motion_beat\\] method: want one of fft"),
+        ("[motion_beat]\nmethod = 'fff'", "\\[motion_beat\\] method: want one of pulse"),
         ("[joints]\na = 1", "want a section of"),
     ],
 )
