@@ -17,7 +17,7 @@ from kernels.types import Clip, Float
 _SALSA_LEFT = ((0.0, 0.24), (0.0, 0.24), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.03, 0.02), (0.0, 0.0), (0.0, 0.0))
 _SALSA_RIGHT = ((0.0, 0.0), (-0.03, -0.02), (0.0, 0.0), (0.0, 0.0), (0.0, -0.24), (0.0, -0.24), (0.0, 0.0), (0.0, 0.0))
 _SALSA_WEIGHT = (1, -1, 1, 1, -1, 1, -1, -1)
-"""The basic step on one, three steps and a hold, forwards left, then back right; chosen by that convention. By count:
+"""The basic step on one, three steps and a hold, forwards left, then back right, by convention. By count:
 where each foot is, metres sideways and ahead of its place, and which foot carries (1 left)."""
 
 

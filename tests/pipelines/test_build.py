@@ -141,7 +141,7 @@ def test_new_session_leaves_the_others_alone(studio, build):
 
 
 def test_changed_setting_makes_stale_what_reads_it(studio, build):
-    (studio / "odori.toml").write_text("[motion_beat]\nextrema_per_beat = 2\n")
+    (studio / "odori.toml").write_text("[motion_beat]\nmethod = 'fft'\n")
     outcome = build(studio)
     assert {"motion_beat", "motion_graph_node"} <= ran(outcome)
     assert not {"clip", "canonical_pose", "music_beat"} & ran(outcome)
