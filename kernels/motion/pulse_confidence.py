@@ -15,7 +15,7 @@ from kernels.types import Float
 
 PULSE_WEIGHTS = (3.28, -14.24, 9.83, 0.95, 1.73, -68.56, 0.47, 5.3, 0.5)
 LEVEL_WEIGHTS = (3.84, 5.63, 0.28, -5.53)
-"""Of :func:`pulse_figures` and :func:`level_figures`. Tuned on 3000 made-up clips by ``benchmarks/motion_pulse_fit.py``,
+"""Of :func:`pulse_figures` and :func:`level_figures`. Tuned on made-up clips by ``benchmarks/motion_pulse_fit.py``,
 as the module says, four dances to one clip without a pulse."""
 
 RELATED_OCTAVES = 0.115
