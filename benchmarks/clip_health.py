@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -31,6 +32,7 @@ from assets.formats import bvh
 from assets.formats.errors import FormatError
 from kernels import rotation
 from kernels.assembly.blend import sample
+from kernels.health.body_in_motion import BodyInMotion
 from kernels.health.examine import examine
 from kernels.skeleton.naming import JointMapping, map_joints
 from kernels.skeleton.retarget import retarget
@@ -90,13 +92,16 @@ def made_up() -> list[Take]:
     return takes
 
 
-def resampled(clip: Clip, rate_hz: float) -> Clip:
-    """Bring a clip to another rate, through its frames."""
-    if clip.frame_rate_hz == rate_hz or clip.translation_xyz_m is not None:
+def resampled(clip: Clip, rate_hz: float, pace: float = 1.0) -> Clip:
+    """Bring a clip to another rate, through its frames; played at a pace."""
+    if clip.frame_rate_hz == rate_hz and pace == 1.0:
         return clip
-    time_s = np.arange(int(clip.duration_s * rate_hz) + 1) / rate_hz
+    time_s = np.arange(int(clip.duration_s / pace * rate_hz) + 1) / rate_hz * pace
     root, turn = sample(clip, time_s)
-    return Clip(clip.skeleton, rate_hz, root, turn)
+    moved = clip.translation_xyz_m
+    if moved is not None:
+        moved = CubicSpline(np.arange(clip.n_frames) / clip.frame_rate_hz, moved, axis=0)(time_s)
+    return Clip(clip.skeleton, rate_hz, root, turn, moved)
 
 
 def _axis(rng: np.random.Generator) -> Float:
@@ -301,9 +306,7 @@ def paced(factor: float) -> Callable[..., Damaged]:
         if factor > 1:
             bad = replace(clip, frame_rate_hz=clip.frame_rate_hz * factor)
         else:
-            time_s = np.arange(clip.n_frames / factor - 1) / clip.frame_rate_hz * factor
-            root, q = sample(clip, np.minimum(time_s, clip.duration_s))
-            bad = Clip(clip.skeleton, clip.frame_rate_hz, root, q)
+            bad = resampled(clip, clip.frame_rate_hz, factor)
         return Damaged(bad, 0, bad.n_frames - 1, frozenset({"rate"}), frozenset({"doubtful"}))
 
     return damage
@@ -365,7 +368,8 @@ def score(takes: list[Take], damage: Callable[..., Damaged], n: int, rng: np.ran
             is_shown = ~after.is_fenced
             apart = rotation.angle_between(after.clip.rotation_wxyz, take.clip.rotation_wxyz)[is_shown]
             errors_deg.append(float(np.degrees(apart.max())))
-            errors_m.append(float(np.abs(after.clip.root_xyz_m - take.clip.root_xyz_m)[is_shown].max()))
+            hips = [BodyInMotion(clip, take.mapping).hips for clip in (after.clip, take.clip)]
+            errors_m.append(float(np.abs(hips[0] - hips[1])[is_shown].max()))
         if seen == n:
             break
     share = {f"{name}_ratio": found[name] / max(seen, 1) for name in (*FOUND, "elsewhere")}

@@ -24,7 +24,7 @@ _PLANTED_M_PER_S = 0.25
 _LEVEL_M = 0.06
 """How far from the level of the feet a planted one may be, on the canonical body. Chosen by hand: a heel's lift."""
 
-_PLANTED_SHARE = 0.3
+_PLANTED_SHARE = 0.2
 """Of the frames, with a foot planted at the level farthest from the head, which tells a floor. Chosen by hand."""
 
 _BENT_RATIO = 0.02
@@ -106,9 +106,9 @@ def unmirrored(body: BodyInMotion) -> tuple[Clip | None, list[ClipFault]]:
     knee = float(np.median(knees)) if len(knees) else 0.0
     toe = float(np.median(toes)) if len(toes) else 0.0
     is_behind = knee < -_BENT_RATIO if len(knees) else False
-    by_toes = toe < -_POINTING_RATIO and (is_behind or (not len(knees) and toe < -_BACKWARDS_COS))
+    by_toes = (is_behind and toe < 0) or (knee < _BACKWARDS_RATIO and toe < -_BACKWARDS_COS)
     if by_toes or (is_behind and not len(toes) and knee < -_BACKWARDS_RATIO):
-        what = [f"knees bend {-100 * knee * body.leg_m:.0f} cm behind the hips"] if len(knees) else []
+        what = [f"knees bend {-100 * knee * body.leg_m:.0f} cm behind the hips"] if is_behind else []
         what += ["toes point behind"] if len(toes) else []
         said = (
             f"left and right are exchanged: {' and '.join(what)}, want ahead; mirrored back; "

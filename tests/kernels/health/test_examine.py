@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from assets.formats import bvh
 from kernels import rotation
+from kernels.health.body_in_motion import BodyInMotion
 from kernels.health.examine import examine
 from kernels.skeleton.naming import map_joints
 from kernels.synthetic import dancer, rigs
@@ -168,3 +170,46 @@ def test_wrongs_of_the_whole_are_righted_before_frames_are_looked_at():
     assert [(f.kind, f.verdict) for f in found.faults] == [("up_axis", "mended"), ("flip", "mended")]
     assert off_deg(found.clip, clip) < 1.0
     assert found.clip.root_xyz_m == pytest.approx(clip.root_xyz_m)
+
+
+@pytest.fixture
+def cases(data_dir):
+    folder = data_dir / "cases" / "clips"
+    if not folder.is_dir():
+        pytest.skip("no field cases there")
+    return folder
+
+
+def look_at(path):
+    taken = bvh.to_clip(bvh.read(path))
+    return examine(taken.clip, taken.mapping)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "plain",
+        "guard_armature_minus_90",
+        "guard_rest_collapsed",
+        "guard_rest_first_frame_crouched",
+        "guard_root_without_position",
+    ],
+)
+def test_field_cases_that_are_right_raise_nothing(cases, name):
+    assert look_at(cases / f"{name}.bvh").faults == ()
+
+
+@pytest.mark.parametrize(("name", "kind"), [("left_handed_x", "mirrored"), ("offsets_m_root_cm", "root_path")])
+def test_field_cases_that_are_wrong_as_a_whole_are_put_right(cases, name, kind):
+    found = look_at(cases / f"{name}.bvh")
+    assert [(f.kind, f.verdict) for f in found.faults] == [(kind, "mended")]
+    truth = np.load(cases / "truth.npz")
+    body = BodyInMotion(found.clip, map_joints(found.clip.skeleton))
+    at = [found.clip.skeleton.index(str(joint)) for joint in truth["joints"]]
+    assert np.abs(body.position_xyz_m[:, at] - truth["position_xyz_m"]).max() < 1e-3
+
+
+def test_a_field_case_of_two_dancers_is_refused(cases):
+    found = look_at(cases / "couple_namespaces.bvh")
+    assert "'Ann:Hips'" in found.refusal
+    assert "'Bob:Hips'" in found.refusal
