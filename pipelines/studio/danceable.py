@@ -86,6 +86,12 @@ class _Held:
         for key in lake.keys("motion_beat"):
             for clip, rows in by_clip(lake.table("motion_beat", key)).items():
                 self._interval_s[clip] = float(np.median(rows["interval_s"].to_numpy()))
+        self._doubt: dict[str, float] = {}
+        for key in lake.keys("motion_tempo"):
+            rows = lake.table("motion_tempo", key)
+            self._doubt |= dict(
+                zip(rows["clip_id"].to_pylist(), rows["confidence_probability"].to_pylist(), strict=True)
+            )
         self._features = _filled(lake, "motion_feature")
         self._is_modelled = _is_there(lake, "choreography_model")
         self._motions: set[str] = set()
@@ -109,7 +115,8 @@ class _Held:
         if self._noded is None:
             return UNBUILT
         if clip not in self._interval_s:
-            return "no pulse was found in it: the motion graph dances from beat to beat"
+            sure = f" (probability {self._doubt[clip]:.2f})" if clip in self._doubt else ""
+            return f"no pulse was found in it{sure}: the motion graph dances from beat to beat"
         if clip not in self._kept:
             nothing = "none of its beats is in the motion graph" if clip not in self._noded else "no pose of it is near"
             return f"{nothing} enough to another beat to go on from; more clips like it would help"
