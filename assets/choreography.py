@@ -6,6 +6,7 @@ import pyarrow as pa
 from assets.dancing.asked import direction_of
 from assets.dancing.method import DanceOrder
 from assets.dancing.methods import METHODS, check_order
+from assets.dancing.without_flips import SEEN_SETTINGS, choose_without_flips
 from assets.declare import refusals_fail, shown, table_asset
 from assets.partitions import DANCE, EVERY, SESSION_TABLES, lake_key
 from assets.sources.sources import Studio, request_of, request_version
@@ -22,7 +23,7 @@ _INPUTS = tuple(dict.fromkeys(name for method in METHODS.values() for name in me
     CHOREOGRAPHY,
     group="dance",
     code_version="5",
-    settings=" ".join(dict.fromkeys(name for method in METHODS.values() for name in method.settings)),
+    settings=" ".join(dict.fromkeys([*SEEN_SETTINGS, *(s for method in METHODS.values() for s in method.settings)])),
     sources="request",
     partitions=DANCE,
     ins={name: dg.AssetIn(partition_mapping=EVERY if name in SESSION_TABLES else None) for name in _INPUTS},
@@ -51,7 +52,7 @@ def choreography(
         asked = direction_of(studio, key)
         check_order(method, song_id, asked)
         order = DanceOrder(song_id, beats, duration_s, studio.settings(), asked, request.temperature, request.seed)
-        danced = method.choose(inputs, order)
+        danced = choose_without_flips(method, inputs, order, frame_rate_hz=request.frame_rate_hz)
     progress.step()
     rows = from_choreography(song_id, way, danced.steps, danced.costs, danced.pin_ids, danced.states)
     return Part(key, rows, request_version(studio, key), metadata=shown(danced.metadata))

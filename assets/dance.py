@@ -6,6 +6,7 @@ from dataclasses import replace
 import dagster as dg
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from assets.dancing.assembled import assemble_steps
 from assets.dancing.shown_moments import flip_sentences, move_sentence
@@ -13,7 +14,7 @@ from assets.declare import table_asset, table_assets
 from assets.partitions import DANCE, EVERY, lake_key
 from assets.plots.dance import contact_sheet, dance_timeline, measure_table
 from assets.plots.draw import picture
-from assets.reading.clips import load_clips, read_clips
+from assets.reading.clips import load_clips, load_fences, read_clips
 from assets.sources.sources import Studio, request_of, request_version
 from assets.stamps import Part, Progress, Stored
 from assets.tables import matching as matching_tables
@@ -105,7 +106,7 @@ def dance_quality(
     strength = matching_tables.strength_between(music_feature, grid_s)
     clips = load_clips(canonical_pose, steps)
     found = {
-        "flips": _flips(dance, steps, clips),
+        "flips": _flips(dance, steps, clips, load_fences(canonical_pose, steps)),
         "beats": [*quality.lag_measures(dance, steps, beat_s), *quality.beat_measures(dance, beat_s)],
         "warp": quality.warp_measures(steps),
         "seams": seam_quality.seam_measures(dance, steps, clips, skeleton=CANONICAL),
@@ -128,10 +129,12 @@ def dance_quality(
             yield _check(name, measures)
 
 
-def _flips(dance: Dance, steps: Choreography, clips: Mapping[str, Clip]) -> list[Measure]:
+def _flips(
+    dance: Dance, steps: Choreography, clips: Mapping[str, Clip], fenced: Mapping[str, NDArray[np.bool_]]
+) -> list[Measure]:
     """Measure what no body does in a frame; what is not as wanted says when, and of which clip."""
     flips = one_frame_flips.find_flips(dance.rotation_wxyz, CANONICAL.parent, dance.frame_rate_hz)
-    furthest = one_frame_flips.furthest_move(dance, steps, clips, skeleton=CANONICAL)
+    furthest = one_frame_flips.furthest_move(dance, steps, clips, skeleton=CANONICAL, fenced=fenced)
     counted, moved = one_frame_flips.flip_measure(flips), one_frame_flips.move_measure(furthest)
     told = () if moved.is_passed or furthest is None else (move_sentence(furthest, dance, steps),)
     return [replace(counted, reasons=flip_sentences(flips, dance, steps)), replace(moved, reasons=told)]

@@ -16,6 +16,7 @@ from assets.dancing.asked import direction_of
 from assets.dancing.assembled import assemble_steps
 from assets.dancing.method import DanceOrder
 from assets.dancing.methods import METHODS, USUAL, check_order
+from assets.dancing.without_flips import choose_without_flips
 from assets.tables.choreography import from_choreography, from_dance_pose, to_choreography
 from assets.tables.music import to_music_beat
 from odori.exceptions import DanceRefusedError, OdoriError, refused
@@ -100,14 +101,16 @@ def draft_song(
             raise DanceRefusedError(f"{song}: cannot be danced: it has no beats; name a beats file in its brief")
         duration_s = float(max(room.stored("song", song).read(song)["duration_s"].to_pylist()))
         order = DanceOrder(song, beats, duration_s, settings, asked, temperature, seed)
-        danced = chosen.choose({name: room.stored(name, song) for name in chosen.inputs}, order)
+        rate_hz = frame_rate_hz or settings.dance.frame_rate_hz
+        inputs = {name: room.stored(name, song) for name in chosen.inputs}
+        danced = choose_without_flips(chosen, inputs, order, frame_rate_hz=rate_hz)
         rows = from_choreography(song, way, danced.steps, danced.costs, danced.pin_ids, danced.states)
         poses = room.stored("canonical_pose", song)
         dance = assemble_steps(
             to_choreography(rows),
             poses,
             settings.dance,
-            frame_rate_hz=frame_rate_hz or settings.dance.frame_rate_hz,
+            frame_rate_hz=rate_hz,
         )
         moved = dance_poses(f"{song}|{way}", from_dance_pose(song, way, dance))
     return Draft(song, way, cast(pl.DataFrame, pl.from_arrow(rows)), moved)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import polars as pl
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from assets.dancing import licences, wishes
 from assets.dancing.asked import SOFT_WISH, Direction
+from assets.dancing.avoided import AvoidedSpan, touched
 from assets.dancing.chosen_steps import ChosenSteps, Markdown
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.pose_pins import ClipPoses, to_pose_pins
@@ -23,7 +24,7 @@ from assets.tables.graph import to_motion_graph
 from kernels.assembly.timing import blend_widths, trim
 from kernels.graph.alternatives import find_alternatives, shared_ratio, shown_price
 from kernels.graph.costs import PathCosts, intensity_price
-from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, to_choreography
+from kernels.graph.path import STEPS, InfeasiblePathError, Path, find_path, first_beats, to_choreography
 from kernels.graph.pin_conflicts import Conflict, Pin, Reach, admitted, find_conflict, step_price
 from kernels.graph.program import StepPrice
 from kernels.graph.structure import structure_pins
@@ -41,7 +42,8 @@ Chosen by hand: 1 a centimetre."""
 class GraphCatalogue:
     """The motion graph as a director may use it: clips by index, and the facts of each node's clip.
 
-    ``poses`` are what pins of a pose need; None where there are no such pins.
+    ``poses`` are what pins of a pose need; None where there are no such pins. ``starts`` are the first beats of the
+    clips, where dances like to begin.
     """
 
     graph: MotionGraph
@@ -49,6 +51,7 @@ class GraphCatalogue:
     nodes: Nodes
     is_allowed: NDArray[np.bool_]
     poses: ClipPoses | None = None
+    starts: Int | None = None
 
 
 def catalogue(
@@ -58,8 +61,10 @@ def catalogue(
     allow: Sequence[str],
     *,
     poses: ClipPoses | None = None,
+    avoid: Sequence[AvoidedSpan] = (),
+    blend_s: float = 0.0,
 ) -> GraphCatalogue:
-    """Join the graph with the facts of its clips, and take out what licences forbid.
+    """Join the graph with the facts of its clips, and take out what licences forbid and what is to be avoided.
 
     Parameters
     ----------
@@ -68,6 +73,8 @@ def catalogue(
     clips : rows of the table ``clip``
     allow : see :class:`Direction`
     poses : see :class:`GraphCatalogue`
+    avoid : stretches of clips that are not to be shown: no step goes through them
+    blend_s : float, seconds, the usual blend, of which half is shown beyond a step
 
     Returns
     -------
@@ -93,7 +100,29 @@ def catalogue(
     ]
     is_allowed = np.array(may_be_danced or [True])[of_node]
     free_graph = replace(graph, source=graph.source[free], target=graph.target[free], weight=graph.weight[free])
-    return GraphCatalogue(free_graph, clip_ids, nodes, is_allowed, poses)
+    cut = without_stretches(free_graph, clip_ids, avoid, blend_s=blend_s)
+    return GraphCatalogue(cut, clip_ids, nodes, is_allowed, poses, first_beats(graph))
+
+
+def without_stretches(
+    graph: MotionGraph, clip_ids: tuple[str, ...], avoid: Sequence[AvoidedSpan], *, blend_s: float
+) -> MotionGraph:
+    """End clips before what is to be avoided, and let them go on after it: no stretch between beats shows it.
+
+    Parameters
+    ----------
+    graph, clip_ids, avoid, blend_s : as :func:`catalogue` has them
+
+    Returns
+    -------
+    MotionGraph of the same nodes
+    """
+    here = np.flatnonzero(graph.next_node >= 0)
+    names = [clip_ids[i] for i in graph.clip_index[here]]
+    ends = graph.time_s[graph.next_node[here]]
+    next_node = graph.next_node.copy()
+    next_node[here[touched(avoid, names, graph.time_s[here], ends, blend_s=blend_s)]] = -1
+    return replace(graph, next_node=next_node)
 
 
 def poses_of(canonical_pose: Stored, settings: Settings) -> ClipPoses:
@@ -129,6 +158,7 @@ def by_graph(known: GraphCatalogue, song: PlayedSong, settings: Settings, asked:
             interval_price=terms.interval_price if terms.interval_price.any() else None,
             step_price=terms.step_price,
             from_any=terms.from_any,
+            first=known.starts,
         )
 
     found = find_alternatives(graph, asked.alternative, find=lambda price: find(price, terms.admissible))
@@ -311,17 +341,19 @@ def search(
     costs: PathCosts,
     *,
     from_any: bool = False,
+    first: Int | None = None,
     **wanted: Any,  # noqa: ANN401 - find_path's
 ) -> Path:
     """Find the path within the hard bounds from the first beat of a clip, else from any beat, else past bounds.
 
-    Where ``from_any``, the first beat of a clip is not preferred: a pose is wished for at the start.
+    Where ``from_any``, the first beat of a clip is not preferred: a pose is wished for at the start. ``first`` are the
+    first beats of the clips; the graph's own for None.
     """
     reason: InfeasiblePathError | None = None
-    each = ("any",) if from_any else ("first", "any")
+    each: list[Literal["first", "any"] | Int] = ["any"] if from_any else ["first" if first is None else first, "any"]
     for starts, strict in ((starts, strict) for strict in (True, False) for starts in each):
         try:
-            return find_path(graph, beat_s, costs=costs, starts=starts, strict=strict, **wanted)  # type: ignore[arg-type]
+            return find_path(graph, beat_s, costs=costs, starts=starts, strict=strict, **wanted)
         except InfeasiblePathError as error:
             reason = error
             if error.reason == "no_nodes":
@@ -355,7 +387,15 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
     """
     graph, clip_ids = to_motion_graph(inputs["motion_graph_node"].read(), inputs["motion_graph_edge"].read())
     poses = poses_of(inputs["canonical_pose"], order.settings)
-    known = catalogue(graph, clip_ids, read_clips(inputs["clip"]), order.direction.allow, poses=poses)
+    known = catalogue(
+        graph,
+        clip_ids,
+        read_clips(inputs["clip"]),
+        order.direction.allow,
+        poses=poses,
+        avoid=order.avoid,
+        blend_s=order.settings.dance.blend_s,
+    )
     feature, repeat = (inputs[name].read(order.song_id) for name in ("music_feature", "music_repeat"))
     song = played_song(order.beats, order.duration_s, feature=feature, repeat=repeat)
     return by_graph(known, song, order.settings, order.direction)
@@ -363,7 +403,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
 
 METHOD = Method(
     name="graph",
-    version="5",
+    version="6",
     inputs=("clip", "motion_graph_node", "motion_graph_edge", "canonical_pose", "music_feature", "music_repeat"),
     settings=("path", "dance.blend_s"),
     choose=choose,

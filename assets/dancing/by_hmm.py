@@ -1,6 +1,6 @@
 """From the model of the dancer and a song to steps: which basic motion when, and which recording of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +9,7 @@ import pyarrow as pa
 
 from assets.dancing import hmm_wishes, licences
 from assets.dancing.asked import Direction
+from assets.dancing.avoided import AvoidedSpan, touched
 from assets.dancing.chosen_steps import ChosenSteps, Markdown
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.recordings import choose_recordings, ends_of
@@ -76,8 +77,9 @@ def load_dancer(
     *,
     asked: Direction,
     settings: Settings,
+    avoid: Sequence[AvoidedSpan] = (),
 ) -> Dancer:
-    """Read the model, and the motions of all clips that may be danced.
+    """Read the model, and the motions of all clips that may be danced, but for those that show what is to be avoided.
 
     Raises
     ------
@@ -91,6 +93,7 @@ def load_dancer(
     own = clips.filter(pl.col("subject") == subject) if subject else clips
     free = licences.free_to_join(dict(own.select("clip_id", "licence").iter_rows()), asked.allow)
     usable = {clip: motions.known() for clip, motions in every.items() if clip in free}
+    usable = {clip: _untouched(clip, motions, avoid, settings.dance.blend_s) for clip, motions in usable.items()}
     usable = {clip: motions for clip, motions in usable.items() if len(motions.state)}
     if not usable:
         why = (
@@ -113,6 +116,12 @@ def load_dancer(
     known = (np.array([str(facts[clip][name]) for clip in clip_ids])[of] for name in ("clip_id", "label", "style"))
     nodes = Nodes(*known)
     return Dancer(model, hmm_tables.to_evidence(music_evidence), clip_ids, motions, nodes)
+
+
+def _untouched(clip: str, motions: ClipMotions, avoid: Sequence[AvoidedSpan], blend_s: float) -> ClipMotions:
+    """Leave out the motions of a clip that show what is to be avoided."""
+    kept = ~touched(avoid, [clip] * len(motions.state), motions.start_s, motions.end_s, blend_s=blend_s)
+    return ClipMotions(motions.start_s[kept], motions.end_s[kept], motions.state[kept])
 
 
 def _pool(usable: Mapping[str, ClipMotions], pinned: set[str], performed: set[str]) -> tuple[tuple[str, ...], Motions]:
@@ -289,6 +298,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
         read_clips(inputs["clip"]),
         asked=order.direction,
         settings=order.settings,
+        avoid=order.avoid,
     )
     with repeatable():
         return by_hmm(
@@ -306,7 +316,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
 
 METHOD = Method(
     name="hmm",
-    version="5",
+    version="6",
     inputs=(
         *("clip", "canonical_pose", "key_pose", "performance"),
         *("choreography_model", "music_evidence", "percussion", "melody"),

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from assets.dancing import licences
+from assets.dancing.avoided import AvoidedSpan
 from assets.dancing.chosen_steps import ChosenSteps, Markdown
-from assets.dancing.match_pieces import LoadedMatches, load_matches, pieces_of
+from assets.dancing.match_pieces import LoadedMatches, load_matches, pieces_of, without_touched
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.refusal import RefusalError
 from assets.plots import matching as matching_plots
@@ -22,7 +23,14 @@ from kernels.types import Float
 from schemas.settings import Settings
 
 
-def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, settings: Settings) -> ChosenSteps:
+def by_matching(
+    found: LoadedMatches,
+    canonical_pose: Stored,
+    beat_s: Float,
+    settings: Settings,
+    *,
+    avoid: Sequence[AvoidedSpan] = (),
+) -> ChosenSteps:
     """Choose one piece a segment: by rhythm, intensity, pace, joints and repetition.
 
     Parameters
@@ -31,6 +39,7 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
     canonical_pose : Stored, poses of clips by session
     beat_s : (B,) float, seconds, increasing, over the whole song
     settings : Settings, of which ``match_path`` and ``dance`` are read
+    avoid : stretches of clips that are not to be shown where there is another piece
 
     Returns
     -------
@@ -44,6 +53,7 @@ def by_matching(found: LoadedMatches, canonical_pose: Stored, beat_s: Float, set
     if not any(clip.duration_s > 0 for clip in found.clips.values()):
         raise RefusalError("no clip can be danced: none is longer than one frame; add clips")
     spans, pieces = pieces_of(found, beat_s, settings.match_path)
+    pieces = [without_touched(ps, avoid, blend_s=settings.dance.blend_s) for ps in pieces]
     clip_ids = sorted({p.clip_id for ps in pieces for p in ps})
     index = {clip: i for i, clip in enumerate(clip_ids)}
     candidates = [
@@ -149,12 +159,12 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
     found = load_matches(order.song_id, *tables_of_song, *of_clips, may_dance=free)
     beat_s, _ = cover(order.beats.time_s, order.duration_s)
     with repeatable():
-        return by_matching(found, inputs["canonical_pose"], beat_s, order.settings)
+        return by_matching(found, inputs["canonical_pose"], beat_s, order.settings, avoid=order.avoid)
 
 
 METHOD = Method(
     name="matching",
-    version="6",
+    version="7",
     inputs=(
         *("clip", "canonical_pose", "motion_feature", "motion_beat"),
         *("match", "music_segment", "music_feature"),

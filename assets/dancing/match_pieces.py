@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from assets.dancing.avoided import AvoidedSpan, touched
 from assets.stamps import Stored
 from assets.tables import matching as matching_tables
 from assets.tables import pack
@@ -155,6 +156,25 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
 
 def _pairs(edges: Float) -> tuple[list[float], list[float]]:
     return edges[:-1].tolist(), edges[1:].tolist()
+
+
+def without_touched(pieces: Sequence[MatchPiece], avoid: Sequence[AvoidedSpan], *, blend_s: float) -> list[MatchPiece]:
+    """Leave out the pieces of a span that show what is to be avoided; the cheapest stays where all of them do.
+
+    Parameters
+    ----------
+    pieces : of one span, at least one
+    avoid : stretches of clips
+    blend_s : float, seconds, the usual blend
+
+    Returns
+    -------
+    list of MatchPiece, in the same order
+    """
+    start_s, end_s = np.array([[p.start_s, p.end_s] for p in pieces]).T
+    bad = touched(avoid, [p.clip_id for p in pieces], start_s, end_s, blend_s=blend_s)
+    kept = [piece for piece, is_bad in zip(pieces, bad.tolist(), strict=True) if not is_bad]
+    return kept or [min(pieces, key=lambda piece: piece.cost)]
 
 
 def places_of(matches: StoredMatches, part: Rhythm, clips: Mapping[str, ClipFeatures], *, most: int) -> list[Place]:

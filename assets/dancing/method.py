@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from assets.dancing.asked import Direction
+from assets.dancing.avoided import AvoidedSpan
 from assets.dancing.chosen_steps import ChosenSteps
 from assets.stamps import Stored
 from kernels.types import BeatGrid
@@ -25,6 +26,7 @@ class DanceOrder:
     direction : pins, licences, which alternative
     temperature : float, or None for the setting's; only where the method draws
     seed : int, of what is drawn
+    avoid : stretches of clips that are not to be shown where there is any other way
     """
 
     song_id: str
@@ -34,6 +36,7 @@ class DanceOrder:
     direction: Direction
     temperature: float | None = None
     seed: int = 0
+    avoid: tuple[AvoidedSpan, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,8 @@ class Method:
     ----------
     name : as it is typed and stored
     version : raised by hand when its dances change; makes its own dances stale, and no others
-    inputs : tables it reads, besides the song's row and beats and the rows of the clips
+    inputs : tables it reads, besides the song's row and beats and the rows of the clips; with ``canonical_pose`` its
+        dances are looked at, and chosen again where they flip
     settings : sections of ``odori.toml`` it reads, or single keys as ``section.key``
     choose : chooses the steps from the inputs by name; raises :class:`assets.dancing.refusal.RefusalError`
     keeps_pins : whether a director's pins are kept

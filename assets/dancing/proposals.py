@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from assets.dancing.asked import Direction, direction_of
+from assets.dancing.avoided import AvoidedSpan
 from assets.dancing.by_graph import (
+    METHOD,
     GraphCatalogue,
     catalogue,
     path_costs,
@@ -19,11 +21,13 @@ from assets.dancing.by_graph import (
     strength_price,
     terms_of,
 )
+from assets.dancing.method import DanceOrder
 from assets.dancing.refusal import RefusalError
 from assets.dancing.wishes import stretch
+from assets.dancing.without_flips import choose_without_flips
 from assets.reading.clips import read_clips
 from assets.reading.songs import PlayedSong, played_song
-from assets.sources.sources import Studio
+from assets.sources.sources import Studio, request_of
 from assets.stamps import Stored
 from assets.tables.graph import to_motion_graph
 from assets.tables.music import to_music_beat
@@ -117,10 +121,29 @@ def propose_at(
     asked = direction_of(studio, f"{song}|graph", pins=pins)
     graph, clip_ids = to_motion_graph(inputs["motion_graph_node"].read(), inputs["motion_graph_edge"].read())
     poses = poses_of(inputs["canonical_pose"], studio.settings())
-    known = catalogue(graph, clip_ids, read_clips(inputs["clip"]), asked.allow, poses=poses)
-    found = propose(known, played, studio.settings(), asked, at)
+    settings = studio.settings()
+    avoid = _avoided(inputs, DanceOrder(song, beats, duration_s, settings, asked), studio)
+    known = catalogue(
+        graph,
+        clip_ids,
+        read_clips(inputs["clip"]),
+        asked.allow,
+        poses=poses,
+        avoid=avoid,
+        blend_s=settings.dance.blend_s,
+    )
+    found = propose(known, played, settings, asked, at)
     said: dict[str, Any] = {"song": song, "place": place, "from_s": at.from_s, "to_s": at.to_s}
     return {**said, "pins": [wish.text for wish in asked.wishes], **found}
+
+
+def _avoided(inputs: Mapping[str, Stored], order: DanceOrder, studio: Studio) -> tuple[AvoidedSpan, ...]:
+    """Find what the dance without another pin avoids, so that its cost is the one told."""
+    rate_hz = request_of(studio, f"{order.song_id}|{METHOD.name}").frame_rate_hz
+    try:
+        return choose_without_flips(METHOD, inputs, order, frame_rate_hz=rate_hz).avoided
+    except RefusalError:
+        return ()
 
 
 def propose(
@@ -245,7 +268,11 @@ def _solved(
             outside_price=price,
             **wished,
         )
-        first = [] if terms.from_any else [np.intersect1d(first_beats(graph), every)]
+        first = (
+            []
+            if terms.from_any
+            else [np.intersect1d(first_beats(graph) if known.starts is None else known.starts, every)]
+        )
         for starts in (*first, every):
             proposals = Proposals(program, starts)
             if is_begun or np.isfinite(proposals.best_cost):

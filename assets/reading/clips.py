@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
+import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from assets.stamps import Stored
 from assets.tables.motion import CanonicalClip, to_canonical_poses
@@ -80,3 +82,18 @@ def load_clips(canonical_pose: Stored, steps: Choreography) -> dict[str, Clip]:
         moved.clip_id: Clip(CANONICAL, moved.frame_rate_hz, moved.root_xyz_m, moved.rotation_wxyz)
         for moved in named_clips(canonical_pose, set(steps.clip_id))
     }
+
+
+def load_fences(canonical_pose: Stored, steps: Choreography) -> dict[str, NDArray[np.bool_]]:
+    """Read which frames of the clips of a choreography are never shown.
+
+    Parameters
+    ----------
+    canonical_pose : Stored, poses of clips by session
+    steps : Choreography
+
+    Returns
+    -------
+    dict of (F,) bool by the names of the steps
+    """
+    return {moved.clip_id: moved.is_fenced for moved in named_clips(canonical_pose, set(steps.clip_id))}

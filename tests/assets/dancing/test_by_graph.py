@@ -7,7 +7,8 @@ import polars as pl
 import pytest
 
 from assets.dancing.asked import SOFT_WISH, Direction
-from assets.dancing.by_graph import by_graph, catalogue, path_costs, search
+from assets.dancing.avoided import AvoidedSpan
+from assets.dancing.by_graph import by_graph, catalogue, path_costs, search, without_stretches
 from assets.dancing.refusal import RefusalError
 from assets.reading.songs import PlayedSong
 from kernels.types import BeatGrid, MotionGraph
@@ -119,3 +120,44 @@ def test_a_pin_that_is_kept_costs_nothing_and_names_its_steps():
     assert found.metadata["costs"]["wish"] == 0
     assert [fact["is_kept"] for fact in found.metadata["pins"]] == [True]
     assert found.pin_ids == [None, None, "1-2=step", "1-2=step", None, None]
+
+
+def test_no_step_goes_through_what_is_to_be_avoided():
+    graph = one_clip(*[0.5] * 8)
+    span = AvoidedSpan("a", 1.7, 1.8)  # between the fourth beat and the fifth
+    assert without_stretches(graph, ("a",), [span], blend_s=0.0).next_node.tolist() == [1, 2, 3, -1, 5, 6, 7, 8, -1]
+    near = without_stretches(graph, (mirrored("a"),), [AvoidedSpan("a", 1.45, 1.45)], blend_s=0.2)
+    assert near.next_node.tolist() == [
+        1,
+        2,
+        -1,
+        -1,
+        5,
+        6,
+        7,
+        8,
+        -1,
+    ]  # half a blend of the stretch after it shows it too
+    assert without_stretches(graph, ("b",), [span], blend_s=0.2).next_node.tolist() == graph.next_node.tolist()
+
+
+def test_a_dance_goes_round_what_is_to_be_avoided_and_is_refused_where_there_is_no_way():
+    clips = pl.DataFrame([{"clip_id": c, "label": "step", "style": "", "licence": ""} for c in ("a", "b")])
+    time_s = np.arange(7) * 0.5
+    song = PlayedSong(time_s, BeatGrid(time_s, np.zeros(7, int), np.zeros(7, int), np.ones(7)), 3.0)
+    none, following = np.zeros(0, np.int64), np.array([*range(1, 7), -1, *range(8, 14), -1])
+    two = MotionGraph(np.repeat([0, 1], 7), np.tile(time_s, 2), following, none, none, np.zeros(0))
+
+    def dance(*avoid):
+        return by_graph(catalogue(two, ("a", "b"), clips, (), avoid=avoid), song, Settings(), Direction()).steps.clip_id
+
+    assert set(dance()) == {"a"}
+    assert set(dance(AvoidedSpan("a", 1.2, 1.3))) == {"b"}
+    with pytest.raises(RefusalError, match="path: want a dance"):
+        dance(AvoidedSpan("a", 0.0, 3.0), AvoidedSpan("b", 0.0, 3.0))
+
+
+def test_dances_begin_on_the_first_beats_of_clips_not_after_what_is_avoided():
+    clips = pl.DataFrame([{"clip_id": "a", "label": "step", "style": "", "licence": ""}])
+    known = catalogue(one_clip(*[0.5] * 8), ("a",), clips, (), avoid=[AvoidedSpan("a", 1.2, 1.3)])
+    assert known.starts.tolist() == [0]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from assets.dancing import by_hmm
+from assets.dancing.avoided import AvoidedSpan
 from assets.dancing.by_hmm import listen
 from assets.reading.hearing import SYMBOLS
 from assets.tables import hmm as hmm_tables
@@ -73,3 +74,10 @@ def test_a_pool_takes_pinned_clips_first_then_performances_then_by_name(monkeypa
     names, motions = by_hmm._pool(usable, set(), set())
     assert names == ("a", "b", "c")
     assert len(motions.start_s) == 6
+
+
+def test_motions_that_show_what_is_to_be_avoided_are_left_out():
+    span = AvoidedSpan("a", 2.2, 2.3)
+    assert by_hmm._untouched("a", motions_of(5), [span], 0.0).start_s.tolist() == [0, 1, 3, 4]
+    assert by_hmm._untouched("a", motions_of(5), [span], 0.5).start_s.tolist() == [0, 3, 4]
+    assert by_hmm._untouched("b", motions_of(5), [span], 0.5).start_s.tolist() == [0, 1, 2, 3, 4]

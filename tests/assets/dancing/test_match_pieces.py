@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from assets.dancing.match_pieces import LoadedMatches, pieces_of
+from assets.dancing.avoided import AvoidedSpan
+from assets.dancing.match_pieces import LoadedMatches, pieces_of, without_touched
 from assets.tables.matching import StoredMatches
-from kernels.matching.price import ClipFeatures
+from kernels.matching.price import ClipFeatures, MatchPiece
 from kernels.motion.motion_features import bumps
 from kernels.music.segments import Segments
 from schemas.settings import MatchPathSettings
@@ -147,3 +148,16 @@ def test_what_fills_a_segment_costs_as_the_worst_match(song):
     settings = MatchPathSettings(match_weight=0.7, intensity_weight=0.3)
     _, spans = pieces_of(song([], {"a": clip()}), BEAT_S, settings)
     assert [(p.match_cost, p.intensity_cost) for p in spans[0]] == [(0.7, 0.3)]
+
+
+def test_pieces_that_show_what_is_to_be_avoided_are_left_out_but_never_all():
+    pieces = [MatchPiece(name, start_s, start_s + 2, 1, cost, 0.0, 0.0) for name, start_s, cost in PIECES]
+    span = AvoidedSpan("a", 2.5, 2.6)
+    assert without_touched(pieces, [span], blend_s=0.4) == [pieces[1], pieces[3]]
+    assert without_touched(pieces, [span], blend_s=0.0) == [pieces[1], pieces[2], pieces[3]]
+    both = [span, AvoidedSpan("a", 7.0, 7.0), AvoidedSpan("b", 0.0, 9.0)]
+    assert without_touched(pieces, both, blend_s=0.4) == [pieces[2]]  # the cheapest stays
+    assert without_touched(pieces, [], blend_s=0.4) == pieces
+
+
+PIECES = [("a", 1.0, 0.5), ("a", 6.0, 0.7), ("a", 2.75, 0.1), ("b", 1.0, 0.9)]

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from assets.reading.clips import image_of, load_clips, named_clips, read_clips
+from assets.reading.clips import image_of, load_clips, load_fences, named_clips, read_clips
 from assets.stamps import ClipStamp, Stamp
 from assets.tables import pack
 from assets.tables.motion import from_canonical_pose, to_canonical_pose
@@ -100,3 +100,16 @@ def test_rows_of_clips_that_were_read():
     assert read_clips(stored)["clip_id"].to_list() == ["a-x", "b-z"]
     assert read_clips(InMemory({"a": {"a-y": rows["a-y"]}})).is_empty()
     assert read_clips(InMemory({"a": stored.rows["a"]}), {"a-x"})["clip_id"].to_list() == ["a-x"]
+
+
+def test_fences_go_by_the_names_of_the_steps(poses):
+    moved = retarget(take("step", n_beats=4).clip, map_joints(CANONICAL))
+    fence = np.arange(len(moved.root_xyz_m)) < 5
+    rows = InMemory({"a": {"a-x": from_canonical_pose("a-x", 30.0, moved, fence)}})
+    names = ("a-x", mirrored("a-x"))
+    one = np.ones(2)
+    steps = Choreography(names, np.arange(2.0), one + np.arange(2), one, one + 1, np.array([False, True]), 0 * one)
+    found = load_fences(rows, steps)
+    assert set(found) == set(names)
+    for mask in found.values():
+        np.testing.assert_array_equal(mask, fence)

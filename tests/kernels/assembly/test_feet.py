@@ -9,6 +9,7 @@ from kernels import rotation
 from kernels.assembly.blend import Dance, Lineage, assemble
 from kernels.assembly.feet import SAY, _within_reach, lock_feet, planted_feet
 from kernels.assembly.foot_quality import foot_measures
+from kernels.assembly.one_frame_flips import find_flips
 from kernels.assembly.seam_quality import seam_measures
 from kernels.assembly.stance import clip_contacts
 from kernels.skeleton import grounding, kinematics
@@ -274,3 +275,21 @@ def test_a_knee_does_not_pop_where_one_planted_foot_is_pulled_far(bend_rad):
     held = lock_feet(mixed, replace(planted, ankle=one, toes=one))
     change = np.diff(knee_angles(held.position_xyz_m), n=2, axis=0)
     assert np.abs(change).max() < 0.015
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 60.0])
+def test_locked_feet_and_toes_turn_in_a_frame_hardly_more_than_they_did(hops, clips, rate_hz):
+    """In the world and against the parent; a foot that is let go does not catch up at once."""
+    made = assemble(hops, clips, skeleton=CANONICAL, frame_rate_hz=rate_hz, duration_s=float(hops.song_end_s[-1]))
+    locked = lock_feet(made, planted_feet(made, hops, clips))
+    joints = [*grounding.ANKLES, *grounding.TOES]
+
+    def turns(dance):
+        _, orientation = kinematics.forward(CANONICAL, dance.root_xyz_m, dance.rotation_wxyz)
+        return np.stack(
+            [rotation.angle_between(q[:-1, joints], q[1:, joints]) for q in (dance.rotation_wxyz, orientation)]
+        )
+
+    assert np.degrees((turns(locked) - turns(made)).max()) < 300 / rate_hz  # 10 degrees at 30 a second
+    assert find_flips(locked.rotation_wxyz, CANONICAL.parent, rate_hz) == []
+    assert np.abs(locked.position_xyz_m - made.position_xyz_m).max() > 0.02  # the feet were moved
