@@ -38,7 +38,9 @@ def test_a_prepared_dance_counts_here_and_is_not_remembered(state, studio):
 def test_a_changed_setting_makes_stale_what_reads_it_and_says_so(studio):
     (studio / "odori.toml").write_text("[dance]\nframe_rate_hz = 24\n", encoding="utf-8")
     found = {(f.asset, f.key): f for f in freshness(StudioFolder(studio)).findings() if f.state != "fresh"}
-    assert {asset for asset, _ in found} <= {"dance_pose", "frame_lineage", "dance_quality", "usd_animation"}
+    made_again = {"choreography", "dance_pose", "frame_lineage", "dance_quality", "usd_animation"}
+    assert {asset for asset, _ in found} <= made_again
+    assert found["choreography", "beat|graph"].state == "stale"  # steps are looked at as they will be, and chosen again
     assert found["dance_pose", "beat|graph"].state == "stale"
     assert "[dance]" in found["dance_pose", "beat|graph"].why
 

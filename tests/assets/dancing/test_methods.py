@@ -10,6 +10,7 @@ from assets.dancing.asked import Direction
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.methods import ALTERNATIVES, METHODS, USUAL, check_order
 from assets.dancing.refusal import RefusalError
+from assets.dancing.without_flips import SEEN_SETTINGS
 from assets.partitions import SESSION_TABLES
 from kernels.types import BeatGrid
 from pipelines.collection import ASSETS
@@ -37,7 +38,7 @@ def test_a_dance_is_made_from_the_inputs_settings_and_version_of_its_own_method(
     node = nodes(ASSETS)["choreography"]
     assert set(node.inputs_of("waltz|matching")) == {*METHODS["matching"].inputs, "music_beat", "song"}
     assert set(node.inputs_of("waltz|graph_2")) == {*METHODS["graph"].inputs, "music_beat", "song"}
-    assert set(node.settings_of("waltz|hmm")) == set(METHODS["hmm"].settings)
+    assert set(node.settings_of("waltz|hmm")) == {*METHODS["hmm"].settings, *SEEN_SETTINGS}
     assert node.code_version_of("waltz|hmm") == METHODS["hmm"].version
 
 
