@@ -130,23 +130,26 @@ def score_beats(
     return f_measure(found, wanted, tolerance_s=float(tolerance_s))
 
 
-def motion_beats(position_xyz_m: ArrayLike, rate_hz: float) -> Float:
+def motion_beats(position_xyz_m: ArrayLike, rate_hz: float, *, method: str = "stops") -> Float:
     """Find when a body slows down: the beats that an onlooker sees.
 
     Parameters
     ----------
-    position_xyz_m : (F, J, 3) float, metres, world; as :attr:`PoseSequence.position_xyz_m`
+    position_xyz_m : (F, J, 3) float, metres, world, Y up; as :attr:`PoseSequence.position_xyz_m`
     rate_hz : float, frames a second, > 0
+    method : ``stops`` or ``pulse``
+        Every stop of the body, or the beats of a dancer's tempo, as a studio's table ``motion_beat`` has them.
 
     Returns
     -------
     (B,) float64, seconds from the first frame, rising
-        Minima of the mean speed of the joints; empty where nothing moves, and for fewer than four frames.
+        Minima of the mean speed of the joints, empty where nothing moves and for fewer than four frames; or the beats of
+        the pulse, empty where there is none.
 
     Raises
     ------
     InputError
-        If the shape is another, a value is not finite, or the rate is not > 0.
+        If the shape is another, a value is not finite, the rate is not > 0, or there is no such method.
 
     Examples
     --------
@@ -156,12 +159,16 @@ def motion_beats(position_xyz_m: ArrayLike, rate_hz: float) -> Float:
     >>> swing[:, 0, 0] = np.sin(2 * np.pi * time_s)
     >>> odori.motion_beats(swing, 60).round(2).tolist()
     [0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.25, 3.75]
+    >>> pulse = odori.motion_beats(swing, 60, method="pulse")
+    >>> bool(np.allclose(pulse, odori.motion_beats(swing, 60), atol=0.02))
+    True
 
     See Also
     --------
     OpenStudio.poses : positions of a clip
     score_beats : how well they agree with a song's
     """
+    from kernels.motion.dance_pulse import dance_pulse
     from kernels.motion.velocity import kinematic_beats
 
     position = _array("position_xyz_m", position_xyz_m).astype(np.float64)
@@ -172,6 +179,10 @@ def motion_beats(position_xyz_m: ArrayLike, rate_hz: float) -> Float:
     _check_finite("position_xyz_m", position)
     if not _number("rate_hz", rate_hz) > 0:
         raise InputError(f"rate_hz: want frames a second, > 0, got {rate_hz}")
+    if method == "pulse":
+        return dance_pulse(position, float(rate_hz)).time_s
+    if method != "stops":
+        raise InputError(f"method: want stops or pulse, got {method!r}")
     return np.asarray(kinematic_beats(position, float(rate_hz)) / float(rate_hz), np.float64)
 
 

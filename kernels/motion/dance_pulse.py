@@ -42,8 +42,9 @@ LEAST_STOP_PER_S2 = 80.0
 stand (at most 90, mostly 40) and real dances (above 300)."""
 
 LEAST_LANDING_M_PER_S2 = 0.3
-LANDING_SHARE = 0.5
-"""Likewise of landings, and how much they count beside stops. Chosen by hand; landings tell down from up."""
+LANDING_SHARE = 0.6
+"""Likewise of landings, and how much they count beside stops. Chosen by hand: a bounce needs 0.6 to be heard where it
+is down, and couples part above 0.7."""
 
 LEAST_FULL = 0.5
 """Strength below which an instant is no full stop, whatever is around it; 1 is what 5 % of the clip reach. Chosen by
@@ -75,6 +76,8 @@ class DancePulse:
         That the dancer counts at this level and at none of the others; 0 where there is no row.
     spread_ratio : float, >= 0
         Standard deviation of the intervals over their mean: how much the tempo breathes.
+    row_s : (R,) float64, seconds
+        The best row of beats, pulse or not, before it is cut to the clip.
     figures : (9,) float64
         What the confidence is made of, :func:`kernels.motion.pulse_confidence.pulse_figures`.
     """
@@ -86,6 +89,7 @@ class DancePulse:
     faster_bpm: float
     level_probability: float
     spread_ratio: float
+    row_s: Float
     figures: Float
 
     @property
@@ -94,7 +98,7 @@ class DancePulse:
         return len(self.time_s) > 0
 
 
-NO_PULSE = DancePulse(np.zeros(0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(9))
+NO_PULSE = DancePulse(np.zeros(0), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(0), np.zeros(9))
 """Of a clip without three beats, by definition."""
 
 
@@ -169,6 +173,7 @@ def dance_pulse(position_m: Float, frame_rate_hz: float, *, parts: Sequence[Sequ
         *other_levels(tempo_bpm),
         probability(level_figures(welcome, time_s), LEVEL_WEIGHTS),
         float(step_s.std() / step_s.mean()),
+        time_s,
         figures,
     )
     if found.confidence_probability < SURE_PROBABILITY:

@@ -188,3 +188,14 @@ def test_counts_and_devices_that_are_none_are_refused(rhythms):
         odori.match([np.ones(10)], rhythms, k=0)
     with pytest.raises(odori.OdoriError, match="no-such-device"):
         odori.match([np.ones(10)], rhythms, device="no-such-device")
+
+
+def test_beats_of_the_pulse_are_the_turns_of_a_swing_and_none_of_a_body_that_stands():
+    swing = np.zeros((480, 1, 3))
+    swing[:, 0, 0] = np.sin(2 * np.pi * np.arange(480) / 60)
+    beats = odori.motion_beats(swing, 60, method="pulse")
+    assert np.abs((beats - 0.25) / 0.5 - np.round((beats - 0.25) / 0.5)).max() < 0.1
+    assert len(beats) >= 14
+    assert len(odori.motion_beats(np.zeros((240, 3, 3)), 60, method="pulse")) == 0
+    with pytest.raises(odori.InputError, match="method: want stops or pulse"):
+        odori.motion_beats(swing, 60, method="guess")

@@ -1,18 +1,22 @@
 """Skeletons, poses and motion beats into tables and back: nothing lost."""
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from assets.tables.motion import (
     from_canonical_pose,
     from_motion_beat,
+    from_motion_tempo,
     from_pose,
     from_skeleton,
     to_canonical_pose,
+    to_motion_tempo,
     to_pose,
     to_skeleton,
 )
+from kernels.motion.dance_pulse import dance_pulse
 from kernels.motion.motion_beats import motion_beats
 from kernels.skeleton.canonical import CANONICAL, JOINTS
 from kernels.skeleton.naming import map_joints
@@ -63,3 +67,35 @@ def test_motion_beats_start_where_the_usable_frames_do():
     np.testing.assert_allclose(table["time_s"].to_numpy(), beats.time_s + 0.2)
     np.testing.assert_array_equal(table["frame_index"].to_numpy(), np.round(30 * (beats.time_s + 0.2)))
     assert table["confidence"][0].as_py() == pytest.approx(beats.confidence, abs=1e-6)
+
+
+def test_tempo_of_a_pulse_and_of_none():
+    found = dance_pulse(place(take("step", n_beats=24, interval_s=0.6)), 30.0)
+    still = dance_pulse(np.zeros((90, 22, 3)), 30.0)
+    table = pa.concat_tables(
+        [from_motion_tempo("s-a", found, beat_count=24), from_motion_tempo("s-b", still, beat_count=0)]
+    )
+    assert table["tempo_bpm"].to_pylist()[0] == pytest.approx(100.0, rel=0.02)
+    assert table["tempo_bpm"].to_pylist()[1] is None
+    assert table["has_pulse"].to_pylist() == [True, False]
+    assert table["beat_count"].to_pylist() == [24, 0]
+    tempi = to_motion_tempo(table)
+    assert tempi["s-a"].has_pulse
+    assert not tempi["s-b"].has_pulse
+    assert tempi["s-a"].level_probability == pytest.approx(found.level_probability, abs=1e-6)
+
+
+def test_tempo_of_principal_components_names_its_levels():
+    beats = motion_beats(place(take("step", n_beats=24, interval_s=0.8)), 30.0)
+    row = from_motion_tempo("s-a", beats, beat_count=24).to_pylist()[0]
+    assert row["tempo_bpm"] == pytest.approx(75.0, rel=0.02)
+    assert row["slower_bpm"] is None
+    assert row["faster_bpm"] == pytest.approx(150.0, rel=0.02)
+
+
+def test_beats_of_a_pulse_have_no_shares_and_their_own_intervals():
+    found = dance_pulse(place(take("step", n_beats=24, interval_s=0.6)), 30.0)
+    table = from_motion_beat("s-a", found, 30.0)
+    np.testing.assert_allclose(table["time_s"].to_numpy(), found.time_s)
+    assert set(table["component_share_ratio"].to_pylist()) == {0.0}
+    assert table["interval_s"][0].as_py() == pytest.approx(0.6, rel=0.02)
