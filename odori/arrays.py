@@ -143,8 +143,8 @@ def motion_beats(position_xyz_m: ArrayLike, rate_hz: float, *, method: str = "st
     Returns
     -------
     (B,) float64, seconds from the first frame, rising
-        Minima of the mean speed of the joints, empty where nothing moves and for fewer than four frames; or the beats of
-        the pulse, empty where there is none.
+        Minima of the mean speed of the joints, empty where nothing moves and for fewer than four frames; or the beats
+        of the pulse, empty where there is none.
 
     Raises
     ------

@@ -50,6 +50,10 @@ LEAST_FULL = 0.5
 """Strength below which an instant is no full stop, whatever is around it; 1 is what 5 % of the clip reach. Chosen by
 hand, so that people who stand and sway have none."""
 
+LEAST_WELCOME = 0.15
+"""Mean welcome of the beats below which there is nothing to be sure of: nothing moves. Chosen by hand, a third of real
+dances'."""
+
 SURE_PROBABILITY = 0.45
 """From here on a clip has a pulse. Chosen by hand, below even odds: a dance lost is worse than one too many."""
 
@@ -169,7 +173,7 @@ def dance_pulse(position_m: Float, frame_rate_hz: float, *, parts: Sequence[Sequ
     found = DancePulse(
         time_s,
         tempo_bpm,
-        probability(figures, PULSE_WEIGHTS),
+        probability(figures, PULSE_WEIGHTS) if figures[1] >= LEAST_WELCOME else 0.0,
         *other_levels(tempo_bpm),
         probability(level_figures(welcome, time_s), LEVEL_WEIGHTS),
         float(step_s.std() / step_s.mean()),

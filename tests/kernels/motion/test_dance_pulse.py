@@ -38,6 +38,7 @@ def test_a_tempo_that_breathes_is_followed(label):
 
 def test_standing_still_has_no_pulse():
     made = place(take("idle", n_beats=24))
+    assert dance_pulse(np.zeros((240, 22, 3)), 30.0).confidence_probability == 0
     for noise_m in (0.0, 0.002):
         found = dance_pulse(made + noise_m * np.random.default_rng(1).normal(size=made.shape), 30.0)
         assert not found.has_pulse
@@ -45,10 +46,8 @@ def test_standing_still_has_no_pulse():
 
 
 def test_most_aimless_motion_has_no_pulse():
-    found = [
-        dance_pulse(kinematics.place(aimless(12.0, frame_rate_hz=30.0, seed=seed))[0], 30.0) for seed in range(12, 24)
-    ]
-    assert sum(one.has_pulse for one in found) <= 4
+    found = [dance_pulse(kinematics.place(aimless(12.0, frame_rate_hz=30.0, seed=seed))[0], 30.0) for seed in range(30)]
+    assert sum(one.has_pulse for one in found) <= 10
     assert np.median([one.confidence_probability for one in found]) < 0.3
 
 
