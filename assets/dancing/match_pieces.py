@@ -14,6 +14,7 @@ from kernels.matching import intensity
 from kernels.matching.pieces import longest_first, motion_under, other_starts, split_span
 from kernels.matching.price import ClipFeatures, MatchPiece, Place, SongSpan, lay_piece, match_cost
 from kernels.matching.score import ratios, similarity
+from kernels.motion.motion_features import FEATURE_RATE_HZ
 from kernels.music.segments import Segments
 from kernels.types import Float
 from schemas.settings import MatchPathSettings
@@ -70,6 +71,7 @@ def load_matches(
                 np.asarray(pack.to_numbers(rows["rhythm"]), np.float32),
                 pack.to_numbers(rows["peak_effort_rad_per_s"]).astype(np.float64),
                 pack.to_numbers(beats[clip]["time_s"]).astype(np.float64) if clip in beats else np.zeros(0),
+                pack.to_numbers(rows["is_fenced"]).astype(bool),
             )
     music = music_feature.read(song_id)
     return LoadedMatches(
@@ -130,24 +132,33 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
                     eases=eases,
                 )
 
-            made = [lay(place) for place in places]
+            made = _shown([lay(place) for place in places], found.clips)
             # Pieces far from their own pace are for segments that have no others.
             easy = [p for p in made if p.is_easy]
             if not easy:
-                made = [lay(place, eases=True) for place in places]
+                made = _shown([lay(place, eases=True) for place in places], found.clips)
                 easy = [p for p in made if p.is_easy]
             every.append(easy or made)
             edges.append(end_s)
             continue
         names = sorted(found.clips)
-        order = longest_first(np.array([len(found.clips[n].rhythm) for n in names], np.int64), most=20)
-        longest_s = found.clips[names[order[0]]].duration_s
+        begin_s, stop_s = np.array([found.clips[n].stretch_s for n in names]).T
+        order = longest_first(np.rint((stop_s - begin_s) * FEATURE_RATE_HZ).astype(np.int64), most=20)
+        longest_s = float(stop_s[order[0]] - begin_s[order[0]])
         for a, b in zip(*_pairs(split_span(start_s, end_s, beat_s=beat_s, longest_s=longest_s)), strict=True):
             every.append(
                 [
-                    MatchPiece(names[n], 0.0, b - a, 0, settings.match_weight, settings.intensity_weight, 0.0)
+                    MatchPiece(
+                        names[n],
+                        float(begin_s[n]),
+                        float(begin_s[n]) + b - a,
+                        0,
+                        settings.match_weight,
+                        settings.intensity_weight,
+                        0.0,
+                    )
                     for n in order
-                    if found.clips[names[n]].duration_s >= b - a - 1e-9
+                    if stop_s[n] - begin_s[n] >= b - a - 1e-9
                 ]
             )
             edges.append(b)
@@ -156,6 +167,11 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
 
 def _pairs(edges: Float) -> tuple[list[float], list[float]]:
     return edges[:-1].tolist(), edges[1:].tolist()
+
+
+def _shown(pieces: list[MatchPiece], clips: Mapping[str, ClipFeatures]) -> list[MatchPiece]:
+    """Leave out pieces of which something is fenced; where all are so, they stay: what is shown there is bridged."""
+    return [p for p in pieces if clips[p.clip_id].may_show(p.start_s, p.end_s)] or pieces
 
 
 def without_touched(pieces: Sequence[MatchPiece], avoid: Sequence[AvoidedSpan], *, blend_s: float) -> list[MatchPiece]:

@@ -12,6 +12,7 @@ from kernels.matching.pieces import ease_pace, motion_under, snap_start
 from kernels.matching.score import SCALE_DENOMINATOR
 from kernels.motion.motion_features import FEATURE_RATE_HZ
 from kernels.ranks import rank_correlation
+from kernels.runs import runs_of, touches
 from kernels.types import Float
 from kernels.warp import WarpWeights, is_easy, warp_cost
 
@@ -28,11 +29,37 @@ as short."""
 
 @dataclass(frozen=True, eq=False)
 class ClipFeatures:
-    """What the choice asks of a clip: (F,) rhythm and intensity before scaling at 120 Hz, (B,) beats in seconds."""
+    """What the choice asks of a clip: (F,) rhythm and intensity before scaling at 120 Hz, (B,) beats in seconds.
+
+    ``is_fenced`` marks what is never shown, (F,); None where all of it may be.
+    """
 
     rhythm: Rhythm
     peak_effort: Float
     beat_s: Float
+    is_fenced: NDArray[np.bool_] | None = None
+
+    @property
+    def stretch_s(self) -> tuple[float, float]:
+        """First and last second of the longest stretch that may be shown; (0, 0) for none."""
+        if self.is_fenced is None:
+            return 0.0, self.duration_s
+        runs = runs_of(~self.is_fenced)
+        if not len(runs):
+            return 0.0, 0.0
+        first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])] / FEATURE_RATE_HZ
+        return float(first), float(last)
+
+    def may_show(self, start_s: float, end_s: float) -> bool:
+        """Whether nothing between two moments is fenced.
+
+        Parameters
+        ----------
+        start_s, end_s : float, seconds of the clip
+        """
+        if self.is_fenced is None:
+            return True
+        return not touches(self.is_fenced, FEATURE_RATE_HZ, np.array([start_s]), np.array([end_s]))[0]
 
     @property
     def duration_s(self) -> float:

@@ -1,5 +1,7 @@
 """Pieces that a span of a song may be danced with: where they lie in their clips, and what each costs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -161,3 +163,32 @@ def test_pieces_that_show_what_is_to_be_avoided_are_left_out_but_never_all():
 
 
 PIECES = [("a", 1.0, 0.5), ("a", 6.0, 0.7), ("a", 2.75, 0.1), ("b", 1.0, 0.9)]
+
+
+def fenced(n_frames, *frames):
+    """Make a clip of which some frames are never shown."""
+    is_fenced = np.zeros(n_frames, bool)
+    is_fenced[list(frames)] = True
+    return replace(clip(n_frames), is_fenced=is_fenced)
+
+
+def test_a_piece_of_which_something_is_fenced_is_left_out_where_there_are_others(song):
+    found = song([("a", 50, 60), ("b", 50, 60)], {"a": fenced(600, 200), "b": fenced(600, 400)})
+    assert [p.clip_id for p in only(found)] == ["b"]
+    alone = song([("a", 50, 60)], {"a": fenced(600, 200)})
+    assert [p.clip_id for p in only(alone)] == ["a"]
+
+
+def test_where_nothing_matches_the_longest_stretch_that_may_be_shown_is_danced(song):
+    found = song([], {"a": fenced(600, 200), "b": fenced(600, 10)}, start_s=0.0, end_s=4.0)
+    edges, every = pieces_of(found, BEAT_S, PLAIN)
+    assert edges[-1] == 4.0
+    for pieces in every:
+        assert all(not found.clips[p.clip_id].is_fenced[int(p.start_s * RATE_HZ) :][:2].any() for p in pieces)
+    assert {p.start_s for pieces in every for p in pieces if p.clip_id == "b"} == {11 / RATE_HZ}
+
+
+def test_the_longest_stretch_is_the_first_of_equals_and_none_where_all_is_fenced():
+    assert fenced(601, 300).stretch_s == (0.0, 299 / RATE_HZ)
+    assert fenced(600, *range(600)).stretch_s == (0.0, 0.0)
+    assert clip(601).stretch_s == (0.0, 5.0)
