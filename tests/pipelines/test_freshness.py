@@ -41,8 +41,8 @@ def test_a_changed_setting_makes_stale_what_reads_it_and_says_so(studio):
     made_again = {"choreography", "dance_pose", "frame_lineage", "dance_quality", "usd_animation"}
     assert {asset for asset, _ in found} <= made_again
     assert found["choreography", "beat|graph"].state == "stale"  # steps are looked at as they will be, and chosen again
-    assert found["dance_pose", "beat|graph"].state == "stale"
-    assert "[dance]" in found["dance_pose", "beat|graph"].why
+    assert "[dance.frame_rate_hz]" in found["choreography", "beat|graph"].why
+    assert found["dance_pose", "beat|graph"].state == "waiting"
 
 
 def test_a_lost_table_is_missing_and_what_reads_it_waits(studio):
