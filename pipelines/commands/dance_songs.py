@@ -88,7 +88,8 @@ def dance_songs(
     told = tuple(f"[{song}{end}" for song in refused for end in "|]")  # a refused song's dance failed, of course
     troubles += [f"failed: {f}" for f in report.failed if not f.startswith(told)]
     troubles = list(dict.fromkeys(troubles))
-    status = DONE if not troubles else SOME_REFUSED if made else NOTHING_DONE
+    is_wanted = all(dance["as_wanted"] for dance in made)
+    status = NOTHING_DONE if not made else DONE if is_wanted and not troubles else SOME_REFUSED
     facts = dance_report.dances_facts(made, troubles, len(keys)) | {"notes": work.notes}
     if not made:
         facts |= next((dict(t.facts) for t in report.troubles if "conflict" in t.facts), {})

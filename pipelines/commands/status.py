@@ -1,5 +1,6 @@
 """What a studio's files and partitions are: read or refused, fresh or not, and why."""
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from pipelines import build
 from pipelines.collection import freshness
 from pipelines.commands import device_report
+from pipelines.commands.dance_report import not_as_wanted
 from pipelines.commands.outcome import DONE, SOME_REFUSED, Outcome
 from pipelines.freshness import Freshness, PartitionState
 from pipelines.studio.folder import StudioFolder, existing
@@ -38,10 +40,28 @@ def studio_status(root: Path, *, devices: bool = False) -> Outcome:
     failures = build.last_failures(build.open_instance(studio), state, unmade) if is_begun else {}
     assets = [_asset_facts(f, state, failures) for f in findings]
     refused = [f for f in (*clips, *songs) if f["state"] == "refused"]
+    dances = _dances(studio)
     notes = list(state.sources.notes)
     facts = {"clips": clips, "songs": songs, "assets": assets, "notes": notes, "warnings": doubts}
+    facts["dances"] = dances
     report = _status_report(studio, clips, songs, assets, refused, notes, doubts)
-    return Outcome(SOME_REFUSED if refused else DONE, facts, report)
+    unwanted = [f"  not as wanted: {d['song']}|{d['method']}: {s}" for d in dances for s in d["not_as_wanted"]]
+    report = "\n".join([report, *unwanted[:LONGEST_LIST], *_more(unwanted)])
+    return Outcome(SOME_REFUSED if refused or unwanted else DONE, facts, report)
+
+
+def _dances(studio: StudioFolder) -> list[dict[str, Any]]:
+    """List the finished dances, and what keeps each from being as wanted."""
+    found = []
+    for key in studio.lake.keys("usd_animation"):
+        song, method = key.split("|")
+        try:
+            report = json.loads((studio.dances_of(song) / f"{method}.json").read_bytes())
+            told = not_as_wanted(report)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            told = [f"its report {method}.json cannot be read ({error}); dance the song again"]
+        found.append({"song": song, "method": method, "as_wanted": not told, "not_as_wanted": told})
+    return found
 
 
 def _asset_facts(finding: PartitionState, state: Freshness, failures: Mapping[tuple[str, str], str]) -> dict[str, Any]:

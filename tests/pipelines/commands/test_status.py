@@ -46,3 +46,20 @@ def test_partitions_stale_for_one_reason_are_one_line(studio):
     assert n_sessions > 1
     assert len(unfresh) == 1
     assert unfresh[0].count(", ") == n_sessions - 1
+
+
+def test_dances_are_listed_with_what_keeps_them_from_being_as_wanted(studio):
+    (dance,) = studio_status(studio).facts["dances"]
+    assert dance == {"song": "beat", "method": "graph", "as_wanted": True, "not_as_wanted": []}
+    place = studio / "dances" / "beat" / "graph.json"
+    report = json.loads(place.read_text())
+    report["wanted"]["one_frame_flip_count"] |= {"is_passed": False, "reasons": ["head flips at 3.2 s"]}
+    place.write_text(json.dumps(report))
+    found = studio_status(studio)
+    assert found.facts["dances"][0]["not_as_wanted"] == ["head flips at 3.2 s"]
+    assert "not as wanted: beat|graph: head flips at 3.2 s" in found.report
+    assert found.status == 1
+    place.unlink()
+    (lost,) = studio_status(studio).facts["dances"]
+    assert not lost["as_wanted"]
+    assert lost["not_as_wanted"][0].startswith("its report graph.json cannot be read")
