@@ -37,6 +37,10 @@ _WILD = 4
 """Sharp steps in one burst that make it a gimbal's: more than in and out, twice. Chosen by hand."""
 
 
+_HALF_TURN_DEG = 150.0
+"""From here on a step may as well be one the other way round. Chosen by hand, beyond all that bodies do in a frame."""
+
+
 @dataclass(frozen=True)
 class _Channel:
     """Signals of one sort: their values, what they are called, and how they are measured and bridged."""
@@ -129,7 +133,7 @@ def _turns(body: BodyInMotion) -> _Channel:
         kind="flip",
         value=value,
         names=[clip.skeleton.joints[k] for k in body.needed],
-        step=body.step_deg,
+        step=_opposed(body.step_deg),
         least=jumps.bound(jumps.TURN_DEG, jumps.TURN_LEAST_DEG, clip.frame_rate_hz),
         plain=(_PLAIN_ONE_DEG, _PLAIN_DEG),
         apart=apart,
@@ -138,6 +142,15 @@ def _turns(body: BodyInMotion) -> _Channel:
         largest=LIMIT_DEG_PER_S / clip.frame_rate_hz,
         unit="°",
     )
+
+
+def _opposed(step_deg: Float) -> Float:
+    """Tell half turns there and back, which look the same, apart: of two in a row the second goes the other way."""
+    out, size = step_deg.copy(), np.linalg.norm(step_deg, axis=-1)
+    for t, k in zip(*np.nonzero((size[1:] > _HALF_TURN_DEG) & (size[:-1] > _HALF_TURN_DEG)), strict=True):
+        if out[t + 1, k] @ out[t, k] > 0:
+            out[t + 1, k] *= 1 - 360 / size[t + 1, k]
+    return out
 
 
 def _moving(body: BodyInMotion) -> NDArray[np.int64]:

@@ -75,3 +75,16 @@ def test_faults_of_one_kind_in_the_same_frames_are_told_once():
     assert [f.first for f in told] == [1, 3]
     assert told[1].reason == "head turns; so does neck"
     assert glitches.told_once([]) == []
+
+
+def test_half_turns_there_and_back_are_told_from_one_turn_that_goes_on():
+    clip = dancer.take("idle").clip
+    k = clip.skeleton.index("head")
+    turning = rotation.from_axis_angle(np.array([0.0, 1.0, 0.0]), 0.05 * np.arange(clip.n_frames))
+    q = clip.rotation_wxyz.copy()
+    q[:, k] = rotation.mul(q[:, k], turning)
+    clip = replace(clip, rotation_wxyz=rotation.continuous(q))
+    for angle_rad in (3.0, np.pi, 3.3):
+        mended, (fault,) = glitches.mend(body(spoilt(clip, ["head"], [31], angle_rad)), none(clip))
+        assert (fault.kind, fault.verdict, fault.first, fault.last) == ("flip", "mended", 31, 31)
+        assert np.degrees(rotation.angle_between(mended.rotation_wxyz, clip.rotation_wxyz)).max() < 1.0
