@@ -17,7 +17,7 @@ from kernels.health.verdicts import ClipFault
 from kernels.skeleton import alignment, topology
 from kernels.types import Float
 
-_ACROSS_COS = 0.5
+_ACROSS_COS = 0.7
 _BESIDE_COS = 0.7
 """Cosines of the trunk with the legs, below, and of the arms with the legs, above, of a body on four legs. Chosen by
 hand: people stand at 1 and -1."""

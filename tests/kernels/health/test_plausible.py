@@ -23,7 +23,7 @@ def look(clip):
     return [(fault.kind, fault.verdict) for fault in faults], " ".join(fault.reason for fault in faults)
 
 
-def dog(*, trunk=1.8, arm=1.4, leg=0.6):
+def dog(*, trunk=1.8, arm=1.4, leg=0.6, pitch_rad=np.pi / 2):
     """A person's joints as a dog has them: the trunk lies, and the arms stand on the floor."""
     offset = CANONICAL.offset_xyz_m.copy()
     for k, name in enumerate(JOINTS):
@@ -32,10 +32,10 @@ def dog(*, trunk=1.8, arm=1.4, leg=0.6):
         offset[k] *= leg if name.endswith(("LowerLeg", "Foot")) else 1.0
     take = dancer.take("step").clip
     q = take.rotation_wxyz.copy()
-    q[:, 0] = rotation.mul(q[:, 0], rotation.from_axis_angle(X, np.pi / 2))
+    q[:, 0] = rotation.mul(q[:, 0], rotation.from_axis_angle(X, pitch_rad))
     for side, sign in (("left", 1.0), ("right", -1.0)):
         k = JOINTS.index(side + "UpperLeg")
-        q[:, k] = rotation.mul(rotation.from_axis_angle(X, -np.pi / 2), q[:, k])
+        q[:, k] = rotation.mul(rotation.from_axis_angle(X, -pitch_rad), q[:, k])
         q[:, JOINTS.index(side + "UpperArm")] = rotation.from_axis_angle(np.array([0.0, sign, 0.0]), -np.pi / 2)
         q[:, JOINTS.index(side + "LowerArm")] = rotation.IDENTITY
     return Clip(Skeleton(JOINTS, CANONICAL.parent, offset), 30.0, take.root_xyz_m * leg, q)
@@ -50,8 +50,9 @@ def test_people_who_dance_are_plausible(move, plan):
     assert look(clip) == ([], "")
 
 
-def test_a_dog_is_refused():
-    kinds, said = look(dog())
+@pytest.mark.parametrize("pitch_deg", [55.0, 90.0])
+def test_a_dog_is_refused_with_its_back_level_or_its_neck_high(pitch_deg):
+    kinds, said = look(dog(pitch_rad=np.radians(pitch_deg)))
     assert kinds == [("proportions", "refused")]
     assert "four legs" in said
 
