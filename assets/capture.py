@@ -32,7 +32,7 @@ from schemas.motion import CLIP, CLIP_FAULT, POSE, SKELETON
     # Poses first: they are made one session at a time while they are stored, and leave the small tables behind.
     (POSE, SKELETON, CALIBRATION, CLIP_FAULT, CLIP),
     group="capture",
-    code_version="6",
+    code_version="7",
     settings="joints limits calibration sensors",
     sources="clips",
     partitions=SESSION,

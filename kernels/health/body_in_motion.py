@@ -21,6 +21,13 @@ from kernels.types import Clip, Float
 
 SIDES = ("left", "right")
 
+SPIN_REACH_M = 0.12
+"""How far beside the points of its feet the axis of a spin may stand, on the canonical body. Chosen by hand: half
+a foot's length."""
+
+_SLOWEST_SPIN_RAD_PER_S = np.pi
+"""Slower, a turn is none of a spin: half a turn a second. Chosen by hand."""
+
 FARTHEST_M = 1e5
 """From the origin. Chosen by hand: farther away no place has millimetres in single precision, and nobody dances."""
 
@@ -138,6 +145,18 @@ class BodyInMotion:
         left = self.place("leftUpperLeg") - self.place("rightUpperLeg")
         forward = np.cross(left, self.trunk)
         return np.asarray(forward / np.maximum(np.linalg.norm(forward, axis=-1, keepdims=True), 1e-12), np.float64)
+
+    @cached_property
+    def spin_m_per_s(self) -> Float:
+        """How fast a spin of the hips alone carries the points of the feet over the floor, (F - 1,), metres a second.
+
+        A body spins about a place under its feet, which is none of their joints: :data:`SPIN_REACH_M` away from one at
+        most. 0 where it turns slower than any spin.
+        """
+        turned = self.orientation_wxyz[:, self.at["hips"]]
+        step_rad = rotation.log(rotation.mul(turned[1:], rotation.inv(turned[:-1])))
+        rate = np.abs(step_rad[:, 1]) * self.clip.frame_rate_hz
+        return np.where(rate > _SLOWEST_SPIN_RAD_PER_S, rate * SPIN_REACH_M * self.scale, 0.0)
 
     @cached_property
     def canonical_turn_wxyz(self) -> Float:

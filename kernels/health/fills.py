@@ -80,9 +80,12 @@ def _is_straight(body: BodyInMotion, stride: int) -> NDArray[np.bool_]:
     way = 100.0 * (body.hips[stride:] - body.hips[:-stride])
     size = np.linalg.norm(step, axis=-1)[:-stride]
     paced = np.linalg.norm(way, axis=-1)[:-stride]
-    change = np.linalg.norm(step[stride:] - step[:-stride], axis=-1).sum(axis=1)
-    change = change + np.linalg.norm(way[stride:] - way[:-stride], axis=-1)
+    change = np.linalg.norm(step[stride:] - step[:-stride], axis=-1)
+    strayed = np.linalg.norm(way[stride:] - way[:-stride], axis=-1)
     allowed = (_PACE_RATIO + _EULER_RATIO * np.radians(np.minimum(size, _MOST_EULER_DEG))) * size
-    allowed_in_all = allowed.sum(axis=1) + 2 * _PACE_RATIO * paced + _RESOLUTION_DEG
+    # The limbs by themselves too: whoever spins evenly turns in the world by far more than limbs ever do in the spin.
+    is_limb = np.array([k > body.at["hips"] for k in body.needed])
+    limbs_go_on = change[:, is_limb].sum(axis=1) < allowed[:, is_limb].sum(axis=1) + _RESOLUTION_DEG
+    all_go_on = change.sum(axis=1) + strayed < allowed.sum(axis=1) + 2 * _PACE_RATIO * paced + _RESOLUTION_DEG
     is_alive = ((size > _LIVE_DEG).sum(axis=1) >= _FEWEST_LIVE) & (size.sum(axis=1) + paced > _MOVING_DEG)
-    return np.asarray((change < allowed_in_all) & is_alive, np.bool_)
+    return np.asarray(limbs_go_on & all_go_on & is_alive, np.bool_)

@@ -63,6 +63,7 @@ def turned_upright(body: BodyInMotion) -> tuple[Clip | None, list[ClipFault]]:
     -------
     clip : turned by half about the x axis, or None
     faults : none, one mended, or one doubtful where the body hangs and nothing shows a floor
+        None where head or hands are on the floor, at zero: a stand on them.
     """
     trunk = body.trunk
     length = np.maximum(np.linalg.norm(trunk, axis=-1), 1e-9)
@@ -77,6 +78,9 @@ def turned_upright(body: BodyInMotion) -> tuple[Clip | None, list[ClipFault]]:
     share = float(is_planted.any(axis=1).mean()) if len(is_planted) else 1.0
     head = f"the head is under the hips (the trunk points up by {upright:.2f} of its length, want above 0)"
     if share < _PLANTED_SHARE:
+        on_floor = np.min([body.place(name)[:, 1] for name in ("head", "leftHand", "rightHand")], axis=0)
+        if abs(float(np.quantile(on_floor, 0.05))) < _FLOOR_RATIO * body.leg_m:
+            return None, []
         said = f"{head}, and no floor shows over the feet: a handstand, or y points down; say health = ok, or turn it"
         return None, [body.whole("up_axis", "doubtful", said)]
     said = (
@@ -166,7 +170,9 @@ def in_one_unit(body: BodyInMotion) -> tuple[Clip | None, list[ClipFault]]:
         return None, []
     hips, leg = body.hips, body.leg_m
     here, level = _glide_and_floor(body)
-    is_flying = here > _FASTEST_GLIDE_M_PER_S * body.scale
+    # Feet that go round fast while the hips stay are those of a spin on head, hands or back.
+    carried = float(_ground_speed(hips[:, None], body.clip.frame_rate_hz).mean())
+    is_flying = min(here, carried) > _FASTEST_GLIDE_M_PER_S * body.scale
     if not is_flying and abs(level) < _FLOOR_RATIO * leg:
         return None, []
     tried = [(*_glide_and_floor(BodyInMotion(_scaled_path(body, scale), body.mapping)), scale) for scale in _UNITS]

@@ -19,6 +19,9 @@ _GLIDE_M = 0.45
 _ON_FLOOR_M = 0.06
 """How far from the floor the lowest point of a foot that stands may be, on the canonical body. Chosen by hand."""
 
+_UPRIGHT_COS = 0.35
+"""Of the trunk with the vertical, above which the feet may carry the body. Chosen by hand, as of a body that lies."""
+
 _CALM_DEG_PER_S = 2.0
 """Usual turn of the joints in a pose that stands still. Chosen by hand, twice what people have who stand about."""
 
@@ -50,13 +53,15 @@ def slides(body: BodyInMotion, is_hidden: NDArray[np.bool_]) -> list[ClipFault]:
     is_shown = ~(is_hidden[1:] | is_hidden[:-1])
     glide, lowest = _glide(body), body.feet[..., 1].min(axis=1)
     floor = float(np.quantile(lowest, 0.05))
-    is_standing = lowest[1:] < floor + _ON_FLOOR_M * body.scale
+    # Who lies, or stands on head or hands, slides and spins as dancers do.
+    is_upright = body.trunk[:, 1] > _UPRIGHT_COS * np.linalg.norm(body.trunk, axis=-1)
+    is_standing = ((lowest < floor + _ON_FLOOR_M * body.scale) & is_upright)[1:]
     found = []
     for first, last in runs_of((glide > _GLIDE_M_PER_S * body.scale) & is_standing & is_shown).tolist():
         way = float(glide[first : last + 1].sum()) / rate_hz
         if way > _GLIDE_M * body.scale:
             found.append((first, last, f"both feet glide {way:.2f} m over the floor"))
-    drift = np.linalg.norm(np.diff(body.hips[:, ::2], axis=0), axis=-1) * rate_hz
+    drift = np.maximum(np.linalg.norm(np.diff(body.hips[:, ::2], axis=0), axis=-1) * rate_hz - body.spin_m_per_s, 0.0)
     is_drifting = (_turning(body) < _CALM_DEG_PER_S) & (drift > _DRIFT_M_PER_S * body.scale) & is_shown
     for first, last in runs_of(is_drifting).tolist():
         way = float(drift[first : last + 1].sum()) / rate_hz
@@ -75,7 +80,7 @@ def slides(body: BodyInMotion, is_hidden: NDArray[np.bool_]) -> list[ClipFault]:
 def _glide(body: BodyInMotion) -> Float:
     """Horizontal speed of whichever point is slowest, over a 30th of a second; (F - 1,).
 
-    The points are those of the feet and the one between them, about which a body spins on both.
+    The points are those of the feet and the one between them. What a spin alone carries them is left out.
     """
     rate_hz = body.clip.frame_rate_hz
     n = max(round(rate_hz / 30.0), 1)
@@ -86,7 +91,8 @@ def _glide(body: BodyInMotion) -> Float:
         after = np.minimum(np.arange(len(step)) + (n + 1) // 2, len(step))
         before = np.maximum(np.arange(len(step)) - n // 2, 0)
         step = (total[after] - total[before]) / (after - before)[:, None, None]
-    return np.asarray(np.linalg.norm(step, axis=-1).min(axis=1) * rate_hz, np.float64)
+    speed = np.linalg.norm(step, axis=-1).min(axis=1) * rate_hz
+    return np.asarray(np.maximum(speed - body.spin_m_per_s, 0.0), np.float64)
 
 
 def _turning(body: BodyInMotion) -> Float:

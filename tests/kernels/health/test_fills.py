@@ -72,3 +72,13 @@ def test_a_pose_that_stands_or_few_frames_hold_no_gap():
     assert straight_fills(body(still)) == []
     few = Clip(clip.skeleton, 30.0, clip.root_xyz_m[:2], clip.rotation_wxyz[:2])
     assert straight_fills(body(few)) == []
+
+
+def test_an_even_spin_in_a_living_pose_is_no_gap():
+    clip = alive()
+    turn = rotation.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.radians(40.0) * np.arange(clip.n_frames))
+    spun = clip.rotation_wxyz.copy()
+    spun[:, 0] = rotation.mul(turn, clip.rotation_wxyz[0, 0])
+    spun[:, 1:] = rotation.slerp(spun[:1, 1:], spun[:, 1:], np.full((1, 1), 0.04))
+    still = np.repeat(clip.root_xyz_m[:1], clip.n_frames, axis=0)
+    assert straight_fills(body(Clip(clip.skeleton, 30.0, still, rotation.continuous(spun)))) == []

@@ -47,16 +47,35 @@ def test_y_that_points_down_is_turned_up(dance):
     assert clip.rotation_wxyz == pytest.approx(dance.rotation_wxyz)
 
 
-def test_a_handstand_has_no_floor_over_its_feet_and_is_doubted():
+def head_down(height_m):
+    """Turn a take over about its hips, at a height; it sways, so that its feet are planted nowhere."""
     dance = dancer.take("kick").clip
     over = rotation.from_axis_angle(np.array([1.0, 0, 0]), np.pi)
     q = dance.rotation_wxyz.copy()
     q[:, 0] = rotation.mul(over, q[:, 0])
     sway = 0.4 * np.sin(np.arange(dance.n_frames) / 3.0)
-    root = np.stack([sway, np.full(len(sway), 0.9), sway], axis=1)
-    clip, (fault,) = righting.turned_upright(body(replace(dance, rotation_wxyz=q, root_xyz_m=root)))
+    root = np.stack([sway, np.full(len(sway), height_m), sway], axis=1)
+    return replace(dance, rotation_wxyz=q, root_xyz_m=root)
+
+
+def test_a_body_head_down_without_a_floor_at_either_end_is_doubted():
+    clip, (fault,) = righting.turned_upright(body(head_down(1.8)))
     assert clip is None
     assert (fault.kind, fault.verdict) == ("up_axis", "doubtful")
+
+
+def test_who_stands_on_the_head_is_left_alone():
+    assert righting.turned_upright(body(head_down(0.7))) == (None, [])
+
+
+def test_feet_that_go_round_while_the_hips_stay_do_not_fly():
+    upside_down = head_down(0.7)
+    turn = rotation.from_axis_angle(np.array([0.0, 1.0, 0]), 0.8 * np.arange(upside_down.n_frames))
+    aside = rotation.from_axis_angle(np.array([0.0, 0, 1.0]), 0.6)
+    q = upside_down.rotation_wxyz.copy()
+    q[:, 0] = rotation.mul(turn, rotation.mul(aside, q[:, 0]))
+    still = np.repeat(upside_down.root_xyz_m[:1], upside_down.n_frames, axis=0)
+    assert righting.in_one_unit(body(replace(upside_down, rotation_wxyz=q, root_xyz_m=still))) == (None, [])
 
 
 @pytest.mark.parametrize("plan", [RigPlan(), RigPlan(axes=rigs.along_bones(), has_root=True)])
