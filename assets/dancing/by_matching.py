@@ -50,10 +50,13 @@ def by_matching(
     RefusalError
         If there is no clip longer than one frame.
     """
+    blend_s = settings.dance.blend_s
     if not any(clip.duration_s > 0 for clip in found.clips.values()):
         raise RefusalError("no clip can be danced: none is longer than one frame; add clips")
-    spans, pieces = pieces_of(found, beat_s, settings.match_path)
-    pieces = [without_touched(ps, avoid, blend_s=settings.dance.blend_s) for ps in pieces]
+    if not any(np.ptp(clip.stretch_s(apart_s=blend_s / 2)) > 0 for clip in found.clips.values()):
+        raise RefusalError("no clip can be danced: what of them may be shown is shorter than a blend; add clips")
+    spans, pieces = pieces_of(found, beat_s, settings.match_path, blend_s=blend_s)
+    pieces = [without_touched(ps, avoid, blend_s=blend_s) for ps in pieces]
     clip_ids = sorted({p.clip_id for ps in pieces for p in ps})
     index = {clip: i for i, clip in enumerate(clip_ids)}
     candidates = [
@@ -69,7 +72,7 @@ def by_matching(
         pieces,
         spans,
         directions_of(canonical_pose, set(clip_ids)),
-        blend_s=settings.dance.blend_s,
+        blend_s=blend_s,
         seam_weight=settings.match_path.seam_weight,
     )
     chosen = match_sequence.choose(
@@ -85,9 +88,9 @@ def by_matching(
         end_s=spans[1:],
         beat_s=beat_s,
         clip_ids=tuple(clip_ids),
-        blend_s=settings.dance.blend_s,
+        blend_s=blend_s,
     )
-    width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=settings.dance.blend_s)
+    width = blend_widths(steps.song_start_s, steps.song_end_s, steps.has_seam, wanted_s=blend_s)
     steps = replace(steps, blend_s=width)
     used = [ps[c] for ps, c in zip(pieces, chosen.choice, strict=True)]
     by_span = {
@@ -164,7 +167,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
 
 METHOD = Method(
     name="matching",
-    version="7",
+    version="8",
     inputs=(
         *("clip", "canonical_pose", "motion_feature", "motion_beat"),
         *("match", "music_segment", "music_feature"),

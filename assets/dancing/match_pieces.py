@@ -89,16 +89,20 @@ def _longest(motion_feature: Stored, may_dance: Container[str], *, most: int = 2
     return {names[i] for i in longest_first(np.array([sizes[n] for n in names], np.int64), most=most)}
 
 
-def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) -> tuple[Float, list[list[MatchPiece]]]:
+def pieces_of(
+    found: LoadedMatches, beat_s: Float, settings: MatchPathSettings, *, blend_s: float = 0.0
+) -> tuple[Float, list[list[MatchPiece]]]:
     """Pieces every span of the song may be danced with: (S + 1,) edges of the spans, and S lists.
 
-    A segment without a match becomes as many spans as the longest clip needs, each with the longest clips' beginnings.
+    A segment without a match of which nothing is fenced becomes as many spans as the longest stretch of a clip that may
+    be shown needs, each with the beginnings of the longest.
 
     Parameters
     ----------
     found : LoadedMatches
     beat_s : (B,) float, seconds, increasing
     settings : MatchPathSettings
+    blend_s : float, seconds, >= 0, the usual blend, of which half is shown beyond either end
 
     Returns
     -------
@@ -132,17 +136,18 @@ def pieces_of(found: LoadedMatches, beat_s: Float, settings: MatchPathSettings) 
                     eases=eases,
                 )
 
-            made = _shown([lay(place) for place in places], found.clips)
+            made = _shown([lay(place) for place in places], found.clips, blend_s)
             # Pieces far from their own pace are for segments that have no others.
             easy = [p for p in made if p.is_easy]
             if not easy:
-                made = _shown([lay(place, eases=True) for place in places], found.clips)
+                made = _shown([lay(place, eases=True) for place in places], found.clips, blend_s)
                 easy = [p for p in made if p.is_easy]
-            every.append(easy or made)
-            edges.append(end_s)
-            continue
+            if made:
+                every.append(easy or made)
+                edges.append(end_s)
+                continue
         names = sorted(found.clips)
-        begin_s, stop_s = np.array([found.clips[n].stretch_s for n in names]).T
+        begin_s, stop_s = np.array([found.clips[n].stretch_s(apart_s=blend_s / 2) for n in names]).T
         order = longest_first(np.rint((stop_s - begin_s) * FEATURE_RATE_HZ).astype(np.int64), most=20)
         longest_s = float(stop_s[order[0]] - begin_s[order[0]])
         for a, b in zip(*_pairs(split_span(start_s, end_s, beat_s=beat_s, longest_s=longest_s)), strict=True):
@@ -169,9 +174,10 @@ def _pairs(edges: Float) -> tuple[list[float], list[float]]:
     return edges[:-1].tolist(), edges[1:].tolist()
 
 
-def _shown(pieces: list[MatchPiece], clips: Mapping[str, ClipFeatures]) -> list[MatchPiece]:
-    """Leave out pieces of which something is fenced; where all are so, they stay: what is shown there is bridged."""
-    return [p for p in pieces if clips[p.clip_id].may_show(p.start_s, p.end_s)] or pieces
+def _shown(pieces: list[MatchPiece], clips: Mapping[str, ClipFeatures], blend_s: float) -> list[MatchPiece]:
+    """Leave out pieces of which, or of the blends at whose ends, something is fenced."""
+    half_s = blend_s / 2
+    return [p for p in pieces if clips[p.clip_id].may_show(p.start_s - half_s, p.end_s + half_s)]
 
 
 def without_touched(pieces: Sequence[MatchPiece], avoid: Sequence[AvoidedSpan], *, blend_s: float) -> list[MatchPiece]:

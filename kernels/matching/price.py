@@ -39,23 +39,35 @@ class ClipFeatures:
     beat_s: Float
     is_fenced: NDArray[np.bool_] | None = None
 
-    @property
-    def stretch_s(self) -> tuple[float, float]:
-        """First and last second of the longest stretch that may be shown; (0, 0) for none."""
+    def stretch_s(self, *, apart_s: float = 0.0) -> tuple[float, float]:
+        """Find the longest stretch that may be shown, the first of equals.
+
+        Parameters
+        ----------
+        apart_s : float, seconds, >= 0, kept between it and what is fenced; nothing at the clip's own ends
+
+        Returns
+        -------
+        start_s, end_s : float, seconds of the clip
+            (0, 0) for none.
+        """
         if self.is_fenced is None:
             return 0.0, self.duration_s
-        runs = runs_of(~self.is_fenced)
-        if not len(runs):
+        bounds = runs_of(~self.is_fenced) / FEATURE_RATE_HZ
+        bounds[bounds[:, 0] > 0, 0] += apart_s
+        bounds[bounds[:, 1] < self.duration_s, 1] -= apart_s
+        length = bounds[:, 1] - bounds[:, 0]
+        if not len(bounds) or length.max() <= 0:
             return 0.0, 0.0
-        first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])] / FEATURE_RATE_HZ
-        return float(first), float(last)
+        start_s, end_s = bounds[np.argmax(length)]
+        return float(start_s), float(end_s)
 
     def may_show(self, start_s: float, end_s: float) -> bool:
         """Whether nothing between two moments is fenced.
 
         Parameters
         ----------
-        start_s, end_s : float, seconds of the clip
+        start_s, end_s : float, seconds of the clip; what lies outside it is left out
         """
         if self.is_fenced is None:
             return True

@@ -175,8 +175,20 @@ def fenced(n_frames, *frames):
 def test_a_piece_of_which_something_is_fenced_is_left_out_where_there_are_others(song):
     found = song([("a", 50, 60), ("b", 50, 60)], {"a": fenced(600, 200), "b": fenced(600, 400)})
     assert [p.clip_id for p in only(found)] == ["b"]
+
+
+def test_where_all_pieces_hold_something_fenced_the_longest_stretch_beside_it_is_danced(song):
     alone = song([("a", 50, 60)], {"a": fenced(600, 200)})
-    assert [p.clip_id for p in only(alone)] == ["a"]
+    (piece,) = only(alone)
+    assert (piece.start_s, piece.rank_number) == (201 / RATE_HZ, 0)
+
+
+def test_half_a_blend_is_kept_between_a_piece_and_a_fence(song):
+    found = song([("a", 50, 60)], {"a": fenced(600, 40)})  # shown from 0.5 to 2.5 s, fenced at 0.33 s
+    _, (near,) = pieces_of(found, BEAT_S, PLAIN, blend_s=0.2)
+    assert near[0].rank_number == 1
+    _, (far,) = pieces_of(found, BEAT_S, PLAIN, blend_s=0.6)
+    assert (far[0].rank_number, far[0].start_s) == (0, pytest.approx(41 / RATE_HZ + 0.3))
 
 
 def test_where_nothing_matches_the_longest_stretch_that_may_be_shown_is_danced(song):
@@ -189,6 +201,7 @@ def test_where_nothing_matches_the_longest_stretch_that_may_be_shown_is_danced(s
 
 
 def test_the_longest_stretch_is_the_first_of_equals_and_none_where_all_is_fenced():
-    assert fenced(601, 300).stretch_s == (0.0, 299 / RATE_HZ)
-    assert fenced(600, *range(600)).stretch_s == (0.0, 0.0)
-    assert clip(601).stretch_s == (0.0, 5.0)
+    assert fenced(601, 300).stretch_s() == (0.0, 299 / RATE_HZ)
+    assert fenced(600, *range(600)).stretch_s() == (0.0, 0.0)
+    assert fenced(600, *range(0, 600, 5)).stretch_s(apart_s=0.2) == (0.0, 0.0)
+    assert clip(601).stretch_s(apart_s=0.2) == (0.0, 5.0)
