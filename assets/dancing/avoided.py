@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from assets.reading.clips import named_clips
+from assets.stamps import Stored
+from kernels.runs import runs_of
 from kernels.types import Float
 from schemas.keys import source_clip
 
@@ -55,6 +58,25 @@ def touched(
     for span in avoid:
         out |= (clip == span.clip_id) & (start_s - half_s <= span.end_s) & (end_s + half_s >= span.start_s)
     return out
+
+
+def fenced_spans(canonical_pose: Stored, clip_ids: set[str]) -> list[AvoidedSpan]:
+    """List what of clips is fenced, with the way to the frames beside it, which is made of both.
+
+    Parameters
+    ----------
+    canonical_pose : Stored, poses of clips by session
+    clip_ids : of the clips to look at
+
+    Returns
+    -------
+    list of AvoidedSpan, by clip, then time; empty where nothing is fenced
+    """
+    return [
+        AvoidedSpan(moved.clip_id, max(first - 1, 0) / moved.frame_rate_hz, (last + 1) / moved.frame_rate_hz)
+        for moved in sorted(named_clips(canonical_pose, clip_ids), key=lambda moved: moved.clip_id)
+        for first, last in runs_of(moved.is_fenced).tolist()
+    ]
 
 
 def merged(spans: Iterable[AvoidedSpan]) -> tuple[AvoidedSpan, ...]:

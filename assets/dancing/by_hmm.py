@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from assets.dancing import hmm_wishes, licences
 from assets.dancing.asked import Direction
-from assets.dancing.avoided import AvoidedSpan, touched
+from assets.dancing.avoided import AvoidedSpan, fenced_spans, touched
 from assets.dancing.chosen_steps import ChosenSteps, Markdown
 from assets.dancing.method import DanceOrder, Method
 from assets.dancing.recordings import choose_recordings, ends_of
@@ -77,9 +77,12 @@ def load_dancer(
     *,
     asked: Direction,
     settings: Settings,
+    canonical_pose: Stored,
     avoid: Sequence[AvoidedSpan] = (),
 ) -> Dancer:
     """Read the model, and the motions of all clips that may be danced, but for those that show what is to be avoided.
+
+    Motions keep half a blend from what is fenced: blends show that much beyond their ends.
 
     Raises
     ------
@@ -111,7 +114,12 @@ def load_dancer(
         if not wish.not_label
         and wish.is_kept_by(clip_id=clip, label=str(facts[clip]["label"]), style=str(facts[clip]["style"]))
     }
-    clip_ids, motions = _pool(usable, pinned, performed)
+    clip_ids, _ = _pool(usable, pinned, performed)
+    fences = fenced_spans(canonical_pose, set(clip_ids))
+    usable = {clip: _untouched(clip, usable[clip], fences, settings.dance.blend_s) for clip in clip_ids}
+    clip_ids, motions = _pool({c: of for c, of in usable.items() if len(of.state)}, pinned, performed)
+    if not clip_ids:
+        raise RefusalError("no clip may be danced: none has a motion half a blend away from what is never shown")
     of = motions.clip_index
     known = (np.array([str(facts[clip][name]) for clip in clip_ids])[of] for name in ("clip_id", "label", "style"))
     nodes = Nodes(*known)
@@ -298,6 +306,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
         read_clips(inputs["clip"]),
         asked=order.direction,
         settings=order.settings,
+        canonical_pose=inputs["canonical_pose"],
         avoid=order.avoid,
     )
     with repeatable():
@@ -316,7 +325,7 @@ def choose(inputs: Mapping[str, Stored], order: DanceOrder) -> ChosenSteps:
 
 METHOD = Method(
     name="hmm",
-    version="6",
+    version="7",
     inputs=(
         *("clip", "canonical_pose", "key_pose", "performance"),
         *("choreography_model", "music_evidence", "percussion", "melody"),

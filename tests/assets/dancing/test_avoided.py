@@ -1,9 +1,10 @@
 """Which stretches of clips show what is to be avoided."""
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
-from assets.dancing.avoided import AvoidedSpan, merged, touched
+from assets.dancing.avoided import AvoidedSpan, fenced_spans, merged, touched
 from schemas.keys import mirrored
 
 
@@ -36,3 +37,18 @@ def test_spans_that_overlap_are_one_and_all_are_in_order():
     assert merged(spans) == (AvoidedSpan("a", 1, 4), AvoidedSpan("b", 1, 2))
     assert merged([]) == ()
     assert str(AvoidedSpan("a", 1, 2.256)) == "a from 1.00 to 2.26 s"
+
+
+def test_what_is_fenced_is_avoided_with_the_way_to_the_frames_beside_it(stored_poses, in_memory):
+    poses = stored_poses(10.0, a=np.zeros(30), b=np.zeros(30), c=np.zeros(30))
+    rows = dict(poses.rows)
+    for name, frames in (("a", [0, 1]), ("b", [12, 20, 21])):
+        k = rows[name].schema.get_field_index("is_fenced")
+        fenced = pa.array(np.isin(np.arange(30), frames))
+        rows[name] = rows[name].set_column(k, rows[name].schema.field(k), fenced)
+    found = fenced_spans(in_memory(rows), {"b", "a"})
+    wanted = [("a", 0.0, 0.2), ("b", 1.1, 1.3), ("b", 1.9, 2.2)]
+    assert [(span.clip_id, span.start_s, span.end_s) for span in found] == [
+        (name, pytest.approx(start_s), pytest.approx(end_s)) for name, start_s, end_s in wanted
+    ]
+    assert fenced_spans(poses, {"a", "c"}) == []
