@@ -89,6 +89,20 @@ def test_a_mirrored_take_is_mirrored_back(dance, plan):
     assert np.median(righting.knee_bend(body(clip))) > 0
 
 
+@pytest.mark.parametrize("leg_ratio", [0.5, 1.0, 3.0])
+def test_straight_legs_are_told_by_their_toes_however_large_the_feet(leg_ratio):
+    """By how far the toes point, not by how long the feet are."""
+    clip = dancer.take("wave", n_beats=6).clip
+    legs = [clip.skeleton.index(side + part) for side in ("left", "right") for part in ("UpperLeg", "LowerLeg", "Foot")]
+    clip.rotation_wxyz[:, legs] = rotation.IDENTITY
+    skeleton = replace(clip.skeleton, offset_xyz_m=clip.skeleton.offset_xyz_m * leg_ratio)
+    truth = replace(clip, skeleton=skeleton, root_xyz_m=clip.root_xyz_m * leg_ratio)
+    mirrored = mapped(truth, np.array([-1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0]))
+    _, (fault,) = righting.unmirrored(body(mirrored))
+    assert (fault.kind, fault.verdict) == ("mirrored", "mended")
+    assert righting.unmirrored(body(truth)) == (None, [])
+
+
 def test_knees_that_bend_backwards_over_toes_that_point_ahead_are_refused(dance):
     q = dance.rotation_wxyz.copy()
     for name in ("leftLowerLeg", "rightLowerLeg"):
