@@ -33,7 +33,7 @@ from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
 from schemas.keys import mirrored, source_clip
 from schemas.settings import MotionGraphSettings
 
-MEMORY_VERSION = "3"
+MEMORY_VERSION = "4"
 """Raised by hand when features, rules or the shortlist change meaning."""
 
 PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
@@ -48,15 +48,18 @@ PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
     "motion_graph",
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
-    code_version="5",
+    code_version="6",
     settings="motion_graph dance.blend_s",
-    ins={name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat")},
+    ins={
+        name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat", "motion_turn")
+    },
     checks={"goes_on": (MOTION_GRAPH_NODE, "A dance can go on for ever.")},
 )
 def motion_graph(
     clip: Stored,
     canonical_pose: Stored,
     motion_beat: Stored,
+    motion_turn: Stored,
     studio: dg.ResourceParam[Studio],
     pair_distance: dg.ResourceParam[PairDistance],
     graph_memory: dg.ResourceParam[KeptArrays],
@@ -73,7 +76,7 @@ def motion_graph(
     beats: list[Beats] = []
     for key in motion_beat.keys:
         labels |= {row["clip_id"]: row["label"] for row in pack.read_rows(clip.read(key)).to_pylist()}
-        beats += _session(key, labels, canonical_pose, motion_beat, settings, known)
+        beats += _session(key, labels, canonical_pose, (motion_beat, motion_turn), settings, known)
         progress.step()
     nodes = nodes_of(beats)
     features, listed, work = near_pairs(
@@ -90,7 +93,7 @@ def motion_graph(
     found = connect(nodes, pairs, threshold=settings.threshold or None)
     graph = _as_moved(found.graph, beats)
     losses = {name: prune(graph) for name, prune in PRUNE.items()}
-    ids = [b.clip_id for b in beats]
+    ids = [_clip_of(b) for b in beats]
     node = _nodes(graph, beats, labels, losses[settings.prune])
     metadata = {
         **_metadata(found, losses, settings.prune),
@@ -117,8 +120,18 @@ def _as_moved(graph: MotionGraph, beats: Sequence[Beats]) -> MotionGraph:
 
 def _nodes(graph: MotionGraph, beats: Sequence[Beats], labels: Mapping[str, str], kept: Pruned) -> pa.Table:
     index = np.concatenate([*(np.arange(len(b.time_s)) for b in beats), np.zeros(0, int)])
-    ids = [b.clip_id for b in beats]
-    return from_motion_graph_node(graph, ids, index, [labels[source_clip(clip)] for clip in ids], kept.is_kept)
+    ids = [_clip_of(b) for b in beats]
+    seen = [labels[source_clip(clip)] for clip in ids]
+    return from_motion_graph_node(graph, ids, index, seen, kept.is_kept, [b.clip_id == _clip_of(b) for b in beats])
+
+
+_TURNS = "~turns"
+"""Behind the name of a clip: the row of its turns, beside that of its beats."""
+
+
+def _clip_of(beats: Beats) -> str:
+    """Name the clip of a row of beats or turns."""
+    return beats.clip_id.removesuffix(_TURNS)
 
 
 def _work(work: Work, beats: Sequence[Beats], known: Mapping[str, Beats]) -> dict[str, object]:
@@ -135,19 +148,28 @@ def _session(
     key: str,
     labels: Mapping[str, str],
     canonical_pose: Stored,
-    motion_beat: Stored,
+    rows: tuple[Stored, Stored],
     settings: MotionGraphSettings,
     known: Mapping[str, Beats],
 ) -> list[Beats]:
-    """Take the beats of one session's clips with their features: remembered ones where nothing changed."""
-    beats = pack.by_clip(motion_beat.read(key))
+    """Take beats and turns of one session's clips with their features: remembered ones where nothing changed."""
+    read = [pack.by_clip(stored.read(key)) for stored in rows[: 2 if settings.turns else 1]]
+    stamps = [stored.stamp(key).clips for stored in rows]
     versions = {
-        clip: version_of(stored.content, motion_beat.stamp(key).clips[clip].content)
+        clip: version_of(stored.content, *(stamp[clip].content for stamp in stamps))
         for clip, stored in canonical_pose.stamp(key).clips.items()
         # Not beats of an earlier build whose renewal failed.
-        if clip in beats and clip in labels
+        if clip in labels and all(clip in stamp for stamp in stamps) and any(clip in one for one in read)
     }
-    images = {clip: [clip, *([mirrored(clip)] if settings.mirror else [])] for clip in versions}
+    images = {
+        clip: [
+            name + row
+            for name in [clip, *([mirrored(clip)] if settings.mirror else [])]
+            for row, one in zip(("", _TURNS), read, strict=False)
+            if clip in one
+        ]
+        for clip in versions
+    }
     changed = [
         clip
         for clip, version in versions.items()
@@ -155,13 +177,15 @@ def _session(
     ]
     poses = pack.by_clip(canonical_pose.read(key, clip_ids=changed)) if changed else {}
     found = []
-    for clip_id in beats:
+    for clip_id in versions:
         if clip_id in poses:
             moved = to_canonical_pose(poses[clip_id])
-            time_s = pack.to_numbers(beats[clip_id]["time_s"])
-            each = (moved, image_of(moved))[: len(images[clip_id])]
-            found += [_beats(image, time_s, versions[clip_id], settings) for image in each]
-        elif clip_id in versions and clip_id not in changed:
+            by_name = {clip_id: moved} | ({mirrored(clip_id): image_of(moved)} if settings.mirror else {})
+            for name in images[clip_id]:
+                clip, is_turn = name.removesuffix(_TURNS), name.endswith(_TURNS)
+                time_s = pack.to_numbers(read[is_turn][clip_id]["time_s"])
+                found.append(replace(_beats(by_name[clip], time_s, versions[clip_id], settings), clip_id=name))
+        elif clip_id not in changed:
             found += [known[name] for name in images[clip_id]]
     return found
 

@@ -21,6 +21,7 @@ from assets.tables.motion import (
     from_canonical_pose,
     from_motion_beat,
     from_motion_tempo,
+    from_motion_turn,
     to_canonical_pose,
     to_fence,
     to_pose,
@@ -37,7 +38,7 @@ from kernels.skeleton.canonical import CANONICAL
 from kernels.skeleton.contacts import foot_contacts
 from kernels.skeleton.retarget import retarget
 from schemas.hmm import BASIC_MOTION, KEY_POSE
-from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE, MOTION_TEMPO
+from schemas.motion import CANONICAL_POSE, MOTION_BEAT, MOTION_FEATURE, MOTION_TEMPO, MOTION_TURN
 from schemas.settings import FeatureSettings, MotionBeatSettings
 from schemas.table import Table
 
@@ -121,6 +122,30 @@ def motion_beats_and_tempi(
 
     yield dg.Output(Parts(session(key) for key in _begun(progress, "motion beats", canonical_pose)), MOTION_BEAT.name)
     yield dg.Output(Parts(tempi), MOTION_TEMPO.name)
+
+
+@table_asset(MOTION_TURN, group="motion", code_version="1", settings="motion_beat", partitions=SESSION)
+def motion_turn(
+    context: dg.AssetExecutionContext,
+    canonical_pose: Stored,
+    studio: dg.ResourceParam[Studio],
+    earlier: dg.ResourceParam[Earlier],
+    progress: dg.ResourceParam[Progress],
+) -> Parts:
+    """Find where the largest movement of every clip turns; none where those are its beats already."""
+    settings = studio.settings().motion_beat
+    code = version_of(code_version(context, MOTION_TURN.name), repr(settings))
+
+    def session(key: str) -> Part:
+        poses = pack.by_clip(canonical_pose.read(key)) if settings.method == "pulse" else {}
+
+        def one(clip_id: str) -> pa.Table:
+            return turns_of(poses[clip_id], settings) if clip_id in poses else MOTION_TURN.empty()
+
+        made_from = clip_versions(canonical_pose, key, code)
+        return per_clip(MOTION_TURN, key, made_from, one, earlier=earlier, progress=progress)
+
+    return Parts(session(key) for key in _begun(progress, "turns of movements", canonical_pose))
 
 
 @table_asset(MOTION_FEATURE, group="motion", code_version="3", settings="feature", partitions=SESSION)
@@ -212,6 +237,32 @@ def beats_of(rows: pa.Table, settings: MotionBeatSettings) -> tuple[pa.Table, pa
         beats = motion_beats(position, rate_hz, heading_rad=heading, settings=beat_settings(settings))
     table = from_motion_beat(moved.clip_id, beats, rate_hz, first_frame=first, is_fenced=moved.is_fenced)
     return table, from_motion_tempo(moved.clip_id, beats, beat_count=table.num_rows)
+
+
+def turns_of(rows: pa.Table, settings: MotionBeatSettings) -> pa.Table:
+    """Find the turns of one clip's largest movement in the frames of it that are usable.
+
+    Parameters
+    ----------
+    rows : table ``canonical_pose``, the rows of one clip, at least one
+    settings : the ``[motion_beat]`` section
+
+    Returns
+    -------
+    table ``motion_turn``, a row a turn
+
+    Raises
+    ------
+    ValueError
+        As :func:`beat_settings`.
+    """
+    moved = to_canonical_pose(rows)
+    first, last = usable_frames(moved.position_xyz_m, moved.frame_rate_hz)
+    kept = slice(first, last + 1)
+    heading = rotation.heading_rad(moved.rotation_wxyz[:, 0])[kept] if settings.frame == "body" else None
+    how = beat_settings(settings)
+    found = motion_beats(moved.position_xyz_m[kept], moved.frame_rate_hz, heading_rad=heading, settings=how)
+    return from_motion_turn(moved.clip_id, found, moved.frame_rate_hz, first_frame=first, is_fenced=moved.is_fenced)
 
 
 def features_of(rows: pa.Table, settings: FeatureSettings) -> pa.Table:

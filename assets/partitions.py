@@ -19,6 +19,7 @@ SESSION_TABLES = (
     "motion_feature",
     "motion_beat",
     "motion_tempo",
+    "motion_turn",
     "key_pose",
     "motion_embedding",
 )

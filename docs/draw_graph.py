@@ -29,6 +29,7 @@ PLACES = {
     "canonical_pose": (2, 1.5),
     "motion_beat": (2, 0.3),
     "motion_tempo": (3, -0.6),
+    "motion_turn": (2, -0.8),
     "motion_graph_node": (3, 0.3),
     "motion_graph_edge": (3, 1.4),
     "song (table)": (1, 4.0),

@@ -11,14 +11,19 @@ NODE_INDEX = Column("node_index", pa.int32(), "Node of the motion graph, from 0,
 
 MOTION_GRAPH_NODE = Table(
     name="motion_graph_node",
-    version=3,
-    meaning="One beat of one clip as a node of the motion graph.",
+    version=4,
+    meaning="One beat, or one turn, of one clip as a node of the motion graph.",
     key=("node_index",),
     columns=(
         NODE_INDEX,
         f.CLIP_ID,
         f.IS_MIRRORED,
         f.BEAT_INDEX,
+        Column(
+            "is_of_pulse",
+            pa.bool_(),
+            "Whether it is a beat (`motion_beat`, by `beat_index`); else a turn (`motion_turn`, by the same index).",
+        ),
         f.TIME_S,
         Column("next_node_index", pa.int32(), "The clip's next beat; -1 at its last."),
         Column("label", pa.string(), "Label of the clip."),

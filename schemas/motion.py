@@ -171,6 +171,20 @@ MOTION_BEAT = Table(
     ),
 )
 
+MOTION_TURN = Table(
+    name="motion_turn",
+    version=1,
+    meaning="One turn of a clip's largest movement, on an even grid: a dance may step there too, off the clip's pulse.",
+    key=("clip_id", "turn_index"),
+    columns=(
+        f.CLIP_ID,
+        Column("turn_index", pa.int32(), "Turn of its clip, from 0."),
+        f.FRAME_INDEX,
+        f.TIME_S,
+        Column("interval_s", pa.float32(), "Interval of the clip's turns."),
+    ),
+)
+
 MOTION_TEMPO = Table(
     name="motion_tempo",
     version=1,

@@ -87,6 +87,9 @@ class MotionGraphSettings(_Checked):
         0.0, "A transition is allowed below this ratio (equation 19 of [Xu2015]); 0: the built-in value.", least=0
     )
     neighbours: int = key(20, "Transitions kept for each beat.", least=1)
+    turns: bool = key(
+        True, "Step on the turns of a clip's largest movement as well as on its beats, where its beats are its pulse."
+    )
     mirror: bool = key(False, "Dance clips mirrored, left for right, as well: twice the catalogue.")
     prune: str = key(
         "reach",

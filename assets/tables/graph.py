@@ -15,14 +15,24 @@ from schemas.keys import is_mirrored, source_clip
 
 
 def from_motion_graph_node(
-    graph: MotionGraph, clip_ids: Sequence[str], beat_index: Int, labels: Sequence[str], is_kept: NDArray[np.bool_]
+    graph: MotionGraph,
+    clip_ids: Sequence[str],
+    beat_index: Int,
+    labels: Sequence[str],
+    is_kept: NDArray[np.bool_],
+    is_of_pulse: Sequence[bool] | None = None,
 ) -> pa.Table:
-    """Pack the nodes of a motion graph, N rows; ``clip_ids`` and ``labels`` are by clip index."""
+    """Pack the nodes of a motion graph, N rows.
+
+    ``clip_ids``, ``labels`` and ``is_of_pulse`` are by clip index; without the last all nodes are beats.
+    """
+    pulse = np.ones(len(clip_ids) + 1, bool) if is_of_pulse is None else np.array([*is_of_pulse, True], bool)
     columns = [
         pa.array(np.arange(len(graph.time_s)), pa.int32()),
         pa.array([source_clip(clip_ids[c]) for c in graph.clip_index], pa.string()),
         pa.array([is_mirrored(clip_ids[c]) for c in graph.clip_index], pa.bool_()),
         pa.array(beat_index, pa.int32()),
+        pa.array(pulse[graph.clip_index], pa.bool_()),
         pa.array(graph.time_s),
         pa.array(graph.next_node, pa.int32()),
         pa.array([labels[c] for c in graph.clip_index], pa.string()),

@@ -26,7 +26,7 @@ from kernels.skeleton.canonical import JOINTS
 from kernels.skeleton.naming import JointMapping
 from kernels.skeleton.retarget import CanonicalMotion
 from kernels.types import Clip, Float, Skeleton
-from schemas.motion import CANONICAL_POSE, CLIP_FAULT, MOTION_BEAT, MOTION_TEMPO, POSE, SKELETON
+from schemas.motion import CANONICAL_POSE, CLIP_FAULT, MOTION_BEAT, MOTION_TEMPO, MOTION_TURN, POSE, SKELETON
 
 Mask = NDArray[np.bool_]
 
@@ -198,6 +198,24 @@ def from_motion_beat(
         *(pa.array(np.full(b, value), pa.float32()) for value in (confidence, interval_s, *shares)),
     ]
     return MOTION_BEAT.check(pa.table(columns, schema=MOTION_BEAT.arrow))
+
+
+def from_motion_turn(
+    clip_id: str, turns: MotionBeats, frame_rate_hz: float, *, first_frame: int, is_fenced: Mask
+) -> pa.Table:
+    """Pack the turns of a clip, a row each; found from ``first_frame`` on, those never shown left out."""
+    time_s = turns.time_s + first_frame / frame_rate_hz
+    frame = np.clip(np.round(time_s * frame_rate_hz).astype(np.int64), 0, len(is_fenced) - 1)
+    is_shown = ~is_fenced[frame]
+    n = int(is_shown.sum())
+    columns = [
+        pa.array([clip_id] * n, pa.string()),
+        pa.array(np.arange(n), pa.int32()),
+        pa.array(frame[is_shown], pa.int32()),
+        pa.array(time_s[is_shown]),
+        pa.array(np.full(n, turns.interval_s), pa.float32()),
+    ]
+    return MOTION_TURN.check(pa.table(columns, schema=MOTION_TURN.arrow))
 
 
 def from_motion_tempo(clip_id: str, beats: MotionBeats | DancePulse, *, beat_count: int) -> pa.Table:

@@ -82,10 +82,11 @@ class _Held:
         kept = None if node is None else node.filter(node["is_kept"])["clip_id"]
         self._noded = None if node is None else set(pc.unique(node["clip_id"]).to_pylist())
         self._kept = set() if kept is None else set(pc.unique(kept).to_pylist())
-        self._interval_s: dict[str, float] = {}
-        for key in lake.keys("motion_beat"):
-            for clip, rows in by_clip(lake.table("motion_beat", key)).items():
-                self._interval_s[clip] = float(np.median(rows["interval_s"].to_numpy()))
+        self._intervals_s: dict[str, list[float]] = {}
+        for table in ("motion_beat", "motion_turn"):
+            for key in lake.keys(table):
+                for clip, rows in by_clip(lake.table(table, key)).items():
+                    self._intervals_s.setdefault(clip, []).append(float(np.median(rows["interval_s"].to_numpy())))
         self._doubt: dict[str, float] = {}
         for key in lake.keys("motion_tempo"):
             rows = lake.table("motion_tempo", key)
@@ -114,13 +115,13 @@ class _Held:
     def _by_graph(self, clip: str, song: DancedSong | None) -> str:
         if self._noded is None:
             return UNBUILT
-        if clip not in self._interval_s:
+        if clip not in self._intervals_s:
             sure = f" (probability {self._doubt[clip]:.2f})" if clip in self._doubt else ""
-            return f"no pulse was found in it{sure}: the motion graph dances from beat to beat"
+            return f"no pulse was found in it{sure}, and no movement that turns evenly: the motion graph steps on these"
         if clip not in self._kept:
             nothing = "none of its beats is in the motion graph" if clip not in self._noded else "no pose of it is near"
             return f"{nothing} enough to another beat to go on from; more clips like it would help"
-        return _out_of_pace(self._interval_s[clip], song)
+        return _out_of_pace(self._intervals_s[clip], song)
 
     def _by_matching(self, clip: str) -> str:
         if not self._features:
@@ -135,16 +136,16 @@ class _Held:
         )
 
 
-def _out_of_pace(interval_s: float, song: DancedSong | None) -> str:
+def _out_of_pace(intervals_s: list[float], song: DancedSong | None) -> str:
     """Say that no step of a clip fits a song's beats; empty where one does, or nobody asks."""
     if song is None or not song.interval_s:
         return ""
-    warps = [music * song.interval_s / (motion * interval_s) for motion, music in STEPS]
+    warps = {music * song.interval_s / (motion * own_s): own_s for own_s in intervals_s for motion, music in STEPS}
     if any(HARD_WARP[0] <= warp <= HARD_WARP[1] for warp in warps):
         return ""
     nearest = min(warps, key=lambda warp: abs(np.log(warp)))
     return (
-        f"its beats, {60 / interval_s:.0f} a minute, would have to be danced at {1 / nearest:.2f} times their pace "
+        f"its beats, {60 / warps[nearest]:.0f} a minute, would have to be danced at {1 / nearest:.2f} times their pace "
         f"to the song's {60 / song.interval_s:.0f}; {1 / HARD_WARP[1]:.2f} to {1 / HARD_WARP[0]:.2f} are allowed"
     )
 

@@ -166,7 +166,7 @@ def test_lost_partition_is_made_again_with_the_same_bytes(studio, build):
     before = place.read_bytes()
     place.unlink()
     # What follows it in its session runs along, every row carried over; the catalogue sees equal content.
-    assert ran(build(studio)) == {"canonical_pose", "motion_beat", "motion_tempo", "motion_feature"}
+    assert ran(build(studio)) == {"canonical_pose", "motion_beat", "motion_tempo", "motion_turn", "motion_feature"}
     assert metadata(studio, "motion_beat", "ayame")["computed_clips"] == 0
     assert place.read_bytes() == before
 

@@ -88,6 +88,7 @@ def test_fenced_frames_are_bridged_and_no_beat_lies_in_them(ill):
     follows = node.filter((pl.col("clip_id") == "ill-burst") & (pl.col("next_node_index") >= 0))
     assert len(follows) > 4
     first, last = np.flatnonzero(moved.is_fenced)[[0, -1]] / moved.frame_rate_hz
+    assert set(follows["is_of_pulse"]) == {True, False}
     next_s = node["time_s"].gather(follows["next_node_index"])
     assert not ((follows["time_s"] < first) & (next_s > last)).any()
 

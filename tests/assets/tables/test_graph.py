@@ -55,3 +55,22 @@ def test_graph_of_nothing():
     back, clips = to_motion_graph(node, from_motion_graph_edge(none, [], np.zeros(0)))
     assert clips == ()
     assert len(back.time_s) == 0
+
+
+def test_beats_and_turns_of_a_clip_are_two_rows_of_one_clip():
+    graph = MotionGraph(
+        clip_index=np.array([0, 0, 1, 1, 1]),
+        time_s=np.array([0.2, 0.7, 0.1, 0.5, 0.9]),
+        next_node=np.array([1, -1, 3, 4, -1]),
+        source=np.array([1]),
+        target=np.array([2]),
+        weight=np.array([0.1]),
+    )
+    index, kept = np.array([0, 1, 0, 1, 2]), np.ones(5, bool)
+    node = from_motion_graph_node(graph, ["s-a", "s-a"], index, ["x", "x"], kept, [True, False])
+    assert node["is_of_pulse"].to_pylist() == [True, True, False, False, False]
+    edge = from_motion_graph_edge(graph, ["s-a", "s-a"], np.array([1.0]))
+    back, clips = to_motion_graph(node, edge)
+    assert clips == ("s-a",)
+    assert back.next_node.tolist() == [1, -1, 3, 4, -1]
+    assert back.time_s.tolist() == graph.time_s.tolist()

@@ -9,6 +9,7 @@ from assets.tables.motion import (
     from_canonical_pose,
     from_motion_beat,
     from_motion_tempo,
+    from_motion_turn,
     from_pose,
     from_skeleton,
     to_canonical_pose,
@@ -67,6 +68,16 @@ def test_motion_beats_start_where_the_usable_frames_do():
     np.testing.assert_allclose(table["time_s"].to_numpy(), beats.time_s + 0.2)
     np.testing.assert_array_equal(table["frame_index"].to_numpy(), np.round(30 * (beats.time_s + 0.2)))
     assert table["confidence"][0].as_py() == pytest.approx(beats.confidence, abs=1e-6)
+
+
+def test_turns_start_where_the_usable_frames_do_and_none_is_fenced():
+    found = motion_beats(place(take("wave"))[6:], 30.0)
+    is_fenced = np.zeros(400, bool)
+    is_fenced[round(30 * (found.time_s[1] + 0.2))] = True
+    table = from_motion_turn("s-a", found, 30.0, first_frame=6, is_fenced=is_fenced)
+    np.testing.assert_allclose(table["time_s"].to_numpy(), np.delete(found.time_s, 1) + 0.2)
+    assert table["turn_index"].to_pylist() == list(range(len(found.time_s) - 1))
+    assert table["interval_s"][0].as_py() == pytest.approx(found.interval_s, abs=1e-6)
 
 
 def test_tempo_of_a_pulse_and_of_none():
