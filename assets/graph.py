@@ -137,7 +137,13 @@ def _clip_of(beats: Beats) -> str:
 def _work(work: Work, beats: Sequence[Beats], known: Mapping[str, Beats]) -> dict[str, object]:
     """Count what was computed, and not remembered."""
     return {
-        "computed_clips": sum(b.version != (known[b.clip_id].version if b.clip_id in known else "") for b in beats),
+        "computed_clips": len(
+            {
+                source_clip(_clip_of(b))
+                for b in beats
+                if b.version != (known[b.clip_id].version if b.clip_id in known else "")
+            }
+        ),
         "computed_rows": work.computed_nodes,
         "rows_searched_again": work.refilled_rows,
         "computed_distances": work.distances,

@@ -76,7 +76,9 @@ def test_a_refused_pin_is_never_told_as_the_reason_for_another_staleness(studio,
     assert content(studio) == before
     assert {facts["state"] for facts in studio_status(studio).facts["assets"]} == {"fresh"}
     (studio / "odori.toml").write_text("[path]\nseam_cost = 1.5\n")
-    assert told(studio) == {"beat|graph": ("stale", "settings [path], [dance.blend_s] changed")}
+    read = ("dance.blend_shape", "dance.lock_feet", "dance.frame_rate_hz", "path", "dance.blend_s")
+    changed = f"settings {', '.join(f'[{name}]' for name in read)} changed"
+    assert told(studio) == {"beat|graph": ("stale", changed)}
     (studio / "odori.toml").unlink()
     assert {facts["state"] for facts in studio_status(studio).facts["assets"]} == {"fresh"}
 
