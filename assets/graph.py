@@ -22,7 +22,7 @@ from assets.tables.motion import CanonicalClip, to_canonical_pose
 from kernels import rotation
 from kernels.graph.beat_features import BeatFeatures, beat_features
 from kernels.graph.distance import PairDistance
-from kernels.graph.nodes import stretch_around
+from kernels.graph.nodes import is_same_row, stretch_around
 from kernels.graph.prune import Pruned, keep_all, keep_endless, keep_strongest, remove_dead_ends
 from kernels.graph.shortlist import Work, nearest_of
 from kernels.graph.transitions import Transitions, blend_margin_s, connect
@@ -33,7 +33,7 @@ from schemas.graph import MOTION_GRAPH_EDGE, MOTION_GRAPH_NODE
 from schemas.keys import mirrored, source_clip
 from schemas.settings import MotionGraphSettings
 
-MEMORY_VERSION = "4"
+MEMORY_VERSION = "5"
 """Raised by hand when features, rules or the shortlist change meaning."""
 
 PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
@@ -48,7 +48,7 @@ PRUNE: dict[str, Callable[[MotionGraph], Pruned]] = {
     "motion_graph",
     (MOTION_GRAPH_NODE, MOTION_GRAPH_EDGE),
     group="catalog",
-    code_version="6",
+    code_version="7",
     settings="motion_graph dance.blend_s",
     ins={
         name: dg.AssetIn(partition_mapping=EVERY) for name in ("clip", "canonical_pose", "motion_beat", "motion_turn")
@@ -160,6 +160,8 @@ def _session(
 ) -> list[Beats]:
     """Take beats and turns of one session's clips with their features: remembered ones where nothing changed."""
     read = [pack.by_clip(stored.read(key)) for stored in rows[: 2 if settings.turns else 1]]
+    if settings.turns:  # turns that are the beats would be shown again for nothing
+        read[1] = {c: t for c, t in read[1].items() if not (c in read[0] and _is_same(read[0][c], t))}
     stamps = [stored.stamp(key).clips for stored in rows]
     versions = {
         clip: version_of(stored.content, *(stamp[clip].content for stamp in stamps))
@@ -194,6 +196,10 @@ def _session(
         elif clip_id not in changed:
             found += [known[name] for name in images[clip_id]]
     return found
+
+
+def _is_same(beats: pa.Table, turns: pa.Table) -> bool:
+    return is_same_row(*(pack.to_numbers(rows["time_s"]) for rows in (beats, turns)))
 
 
 def _beats(moved: CanonicalClip, beat_s: Float, version: str, settings: MotionGraphSettings) -> Beats:

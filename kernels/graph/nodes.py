@@ -130,3 +130,28 @@ def stretch_around(beat_s: Float, is_fenced: Mask, frame_rate_hz: float) -> tupl
     bounds = stretch[np.clip(np.searchsorted(stretch[:, 0], frame, side="right") - 1, 0, None)] / frame_rate_hz
     # A beat lies between frames: half a frame past the last one it is still that stretch's.
     return np.minimum(bounds[:, 0], beat_s), np.maximum(bounds[:, 1], beat_s)
+
+
+SAME_INSTANT_S = 0.07
+"""Two rows of instants nearer than this are told apart by nobody: the window of beat measures, by convention."""
+
+SAME_SHARE = 0.8
+"""Share of either row that lies on the other where they are one row. Chosen by hand."""
+
+
+def is_same_row(one_s: Float, other_s: Float) -> bool:
+    """Whether two rows of instants of a clip are one: as nodes of both it would be shown twice at the price of once.
+
+    Parameters
+    ----------
+    one_s, other_s : (B,), (C,) float, seconds, increasing
+
+    Returns
+    -------
+    bool
+        False where one of them is empty.
+    """
+    if not len(one_s) or not len(other_s):
+        return False
+    is_near = np.abs(np.asarray(one_s)[:, None] - np.asarray(other_s)) <= SAME_INSTANT_S
+    return bool(is_near.any(axis=1).mean() >= SAME_SHARE and is_near.any(axis=0).mean() >= SAME_SHARE)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kernels.graph.nodes import BeatNodes, beat_nodes, stretch_around
+from kernels.graph.nodes import BeatNodes, beat_nodes, is_same_row, stretch_around
 
 
 @pytest.fixture
@@ -108,3 +108,12 @@ def test_a_stretch_of_a_beat_between_two_frames_holds_it():
     np.testing.assert_allclose(start_s, [0.0, 0.38])
     np.testing.assert_allclose(end_s, [0.23, 0.4])
     assert [len(part) for part in stretch_around(np.zeros(0), is_fenced, 10.0)] == [0, 0]
+
+
+def test_two_rows_are_one_where_most_of_both_lie_on_the_other():
+    row = np.arange(0.2, 5, 0.5)
+    assert is_same_row(row, row + 0.06)
+    assert is_same_row(row, row[1:] - 0.06)
+    assert not is_same_row(row, row + 0.1)
+    assert not is_same_row(row, np.arange(0.2, 5, 0.25))  # twice as many
+    assert not is_same_row(row, np.zeros(0))
